@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/result.h"
+
+namespace relocd {
+
+/// `<doing>: <what errno says>`. Call it before anything else can change errno.
+Error SystemError(ErrorKind kind, std::string_view doing);
+
+/// The whole file. @return kUnavailable when it cannot be read.
+Result<std::string> ReadFile(const std::string& path);
+
+/// Replaces the file by `bytes` such that a reader, also one after a power cut, sees the old or the
+/// new content whole: writes beside it, syncs, renames, syncs the folder.
+///
+/// @return kUnavailable when it cannot be written; the old file is then still there.
+Result<void> WriteFileAtomically(const std::string& path, std::string_view bytes);
+
+}  // namespace relocd
