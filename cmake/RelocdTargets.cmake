@@ -9,6 +9,7 @@ target_compile_features(relocd_build_flags INTERFACE cxx_std_20)
 target_compile_options(relocd_build_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wnon-virtual-dtor -Wold-style-cast -Wimplicit-fallthrough
   -ffp-contract=off)  # the exact replay gives the same bits on CPUs with and without FMA
+target_link_options(relocd_build_flags INTERFACE -Wl,--as-needed)  # camerad and the like load neither OpenCV nor Ceres
 if(RELOCD_SANITIZERS)
   target_compile_options(relocd_build_flags INTERFACE -fsanitize=${RELOCD_SANITIZERS} -fno-omit-frame-pointer)
   target_link_options(relocd_build_flags INTERFACE -fsanitize=${RELOCD_SANITIZERS})
@@ -44,7 +45,7 @@ function(relocd_add_daemon name)
   target_include_directories(${name}_node PUBLIC ${PROJECT_SOURCE_DIR}/daemons)
   target_link_libraries(${name}_node PUBLIC ${arg_DEPENDS} PRIVATE relocd_build_flags)
   add_executable(${name} main.cc)
-  target_link_libraries(${name} PRIVATE ${name}_node relocd::runtime relocd_build_flags)
+  target_link_libraries(${name} PRIVATE ${name}_node relocd_daemon relocd_build_flags)
 endfunction()
 
 # relocd_add_tool(<verb> [DEPENDS ...]): tools/reloc_<verb>.cc as the executable reloc-<verb>.

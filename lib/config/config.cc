@@ -1,0 +1,78 @@
+#include "config/config.h"
+
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "config/yaml_reader.h"
+#include "config/yaml_writer.h"
+#include "core/file.h"
+#include "core/sha256.h"
+
+namespace relocd {
+namespace {
+
+/// The part of an udpm url that tells networks apart.
+std::string_view PortOf(std::string_view url) {
+  const auto query = url.find('?');
+  url = url.substr(0, query);
+  const auto colon = url.rfind(':');
+  return colon == std::string_view::npos ? url : url.substr(colon + 1);
+}
+
+/// Puts file and line before a message of Validate(), which begins with the key's full name.
+Error Locate(Error error, const std::string& path, const YamlReader::Lines& lines) {
+  std::string key = error.message.substr(0, error.message.find(' '));
+  while (!key.empty()) {
+    if (const auto found = lines.find(key); found != lines.end()) {
+      return std::move(error).WithContext(fmt::format("{}: line {}", path, found->second));
+    }
+    const auto dot = key.rfind('.');
+    key.resize(dot == std::string::npos ? 0 : dot);
+  }
+  return std::move(error).WithContext(path);
+}
+
+}  // namespace
+
+Result<void> BusConfig::Validate() const {
+  const bool multicast = control_url.starts_with("udpm://") && image_url.starts_with("udpm://");
+  if (multicast && PortOf(control_url) == PortOf(image_url)) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("image_url has port {} as control_url has, must have another",
+                             PortOf(image_url))};
+  }
+  return {};
+}
+
+Result<void> Config::Validate() const {
+  const auto check = [](const char* section, const auto& config) -> Result<void> {
+    auto ok = config.Validate();
+    if (ok) return ok;
+    const Error error = std::move(ok).error();
+    return Error{error.kind, fmt::format("{}.{}", section, error.message)};
+  };
+  return check("bus", bus);
+}
+
+Result<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides) {
+  auto text = ReadFile(path);
+  if (!text) return std::move(text).error();
+  Config config;
+  auto lines = YamlReader::ReadText(*text, path, overrides, config);
+  if (!lines) return std::move(lines).error();
+  if (auto ok = config.Validate(); !ok) return Locate(std::move(ok).error(), path, *lines);
+  return config;
+}
+
+std::string FormatConfig(const Config& config) {
+  return YamlWriter::Write(config);
+}
+
+std::string ConfigHash(const Config& config) {
+  constexpr std::size_t kDigits = 16;
+  return Sha256Hex(FormatConfig(config)).substr(0, kDigits);
+}
+
+}  // namespace relocd

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace relocd {
+
+/// The two LCM networks. They must differ in the port: LCM binds to every address, so groups do not
+/// separate.
+struct BusConfig {
+  std::string control_url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string image_url = "udpm://239.255.76.67:7668?ttl=0&recv_buf_size=4194304";
+
+  template <typename Self, typename Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("control_url", self.control_url, "all messages but images");
+    visit("image_url", self.image_url, "IMAGE_<camera>; another port than control_url's");
+  }
+  [[nodiscard]] Result<void> Validate() const;
+};
+
+/// All that a robot's YAML file says: the modules' structs, put together.
+struct Config {
+  BusConfig bus;
+
+  template <typename Self, typename Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("bus", self.bus, "The LCM networks between the daemons.");
+  }
+
+  /// @return kInvalidInput; the message begins with the full name of the key.
+  [[nodiscard]] Result<void> Validate() const;
+};
+
+/// Reads, checks and completes a config.
+///
+/// @param path       paths in the file are relative to its folder, and absolute in the result.
+/// @param overrides  `section.key=value`, put over the file's.
+/// @return kInvalidInput with file, line, key, value and what is allowed; kUnavailable when the
+/// file cannot be read.
+Result<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides);
+
+/// Every key with its comment; LoadConfig reads it back to the same.
+std::string FormatConfig(const Config& config);
+
+/// The first 16 hex digits of the sha256 of the formatted config.
+std::string ConfigHash(const Config& config);
+
+}  // namespace relocd

@@ -1,0 +1,62 @@
+#include "config/yaml_writer.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include <fmt/format.h>
+
+namespace relocd {
+namespace {
+
+constexpr int kIndent = 2;
+constexpr std::size_t kCommentColumn = 44;
+
+}  // namespace
+
+std::string YamlWriter::Format(bool value) {
+  return value ? "true" : "false";
+}
+std::string YamlWriter::Format(int value) {
+  return fmt::format("{}", value);
+}
+std::string YamlWriter::Format(std::int64_t value) {
+  return fmt::format("{}", value);
+}
+std::string YamlWriter::Format(double value) {
+  return fmt::format("{}", value);
+}
+
+std::string YamlWriter::Format(const std::string& value) {
+  std::string text = "\"";
+  for (const char character : value) {
+    if (character == '"' || character == '\\') text += '\\';
+    if (character == '\n') {
+      text += "\\n";
+    } else {
+      text += character;
+    }
+  }
+  return text + "\"";
+}
+
+void YamlWriter::BeginSection(const std::string& name, const std::string& comment, int depth) {
+  if (depth == 0 && !text_.empty()) text_ += '\n';
+  const std::string indent(static_cast<std::size_t>(depth * kIndent), ' ');
+  if (!comment.empty()) fmt::format_to(std::back_inserter(text_), "{}# {}\n", indent, comment);
+  fmt::format_to(std::back_inserter(text_), "{}{}:\n", indent, name);
+}
+
+void YamlWriter::WriteLine(const std::string& name,
+                           const std::string& value,
+                           const std::string& comment,
+                           int depth) {
+  std::string line(static_cast<std::size_t>(depth * kIndent), ' ');
+  line += name + ": " + value;
+  if (!comment.empty()) {
+    line.resize(std::max(line.size() + 2, kCommentColumn), ' ');
+    line += "# " + comment;
+  }
+  text_ += line + "\n";
+}
+
+}  // namespace relocd
