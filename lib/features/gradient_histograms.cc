@@ -1,0 +1,202 @@
+#include "features/gradient_histograms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+namespace relocd {
+namespace {
+
+constexpr int kDescriptor = GradientMaps::kDescriptorSize;
+
+/// Gradient sums of the camera's noise alone are of this order: it keeps flat cells from being
+/// stretched to full contrast, and the logarithm finite.
+constexpr float kNoiseEnergy = 200.0F;
+
+/// Of cells on a side. A tile may have at most kTileShare times its even share of the chosen cells.
+constexpr int kTileCells = 8;
+constexpr double kTileShare = 2.5;
+
+Result<void> CheckRange(const char* field, int value, int low, int high) {
+  if (value >= low && value <= high) return {};
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("features.{} is {}, must be in [{}, {}]", field, value, low, high)};
+}
+
+/// Root-normalises one octave's histogram in place. @return the logarithm of its energy.
+float NormaliseHistogram(std::span<float> histogram) {
+  float energy = kNoiseEnergy;
+  for (const float value : histogram) {
+    energy += value;
+  }
+  const float scale = 1.0F / energy;
+  for (float& value : histogram) {
+    value = std::sqrt(value * scale);
+  }
+  return std::log(energy);
+}
+
+}  // namespace
+
+Result<void> Validate(const GradientHistogramsConfig& config) {
+  constexpr int kMaxSide = 8192;
+  constexpr int kMinWorkingSide = 64;
+  constexpr int kMaxOctaves = 4;
+  using Rule = std::tuple<const char*, int, int, int>;
+  for (const auto& [field, value, low, high] :
+       {Rule{"image_width", config.image_width, 16, kMaxSide},
+        Rule{"image_height", config.image_height, 16, kMaxSide},
+        Rule{"working_width", config.working_width, kMinWorkingSide, kMaxSide},
+        Rule{"working_height", config.working_height, kMinWorkingSide, kMaxSide},
+        Rule{"cell_stride", config.cell_stride, 2, 64},
+        Rule{"octaves", config.octaves, 1, kMaxOctaves}}) {
+    if (auto checked = CheckRange(field, value, low, high); !checked) return checked;
+  }
+  return {};
+}
+
+GradientHistogramsConfig GradientHistogramsForImage(int width, int height) {
+  constexpr double kWorkingPixels = 1040.0 * 320.0;
+  constexpr double kMaxEnlargement = 2.5;  // beyond it there is nothing more to see
+  const double pixels = static_cast<double>(width) * height;
+  double scale = std::min(std::sqrt(kWorkingPixels / pixels), kMaxEnlargement);
+  if (scale > 0.8 && scale < 1.25) scale = 1.0;
+  GradientHistogramsConfig config;
+  config.image_width = width;
+  config.image_height = height;
+  config.working_width = static_cast<int>(std::lround(scale * width));
+  config.working_height = static_cast<int>(std::lround(scale * height));
+  return config;
+}
+
+Result<std::unique_ptr<GradientHistograms>> GradientHistograms::Create(
+    const GradientHistogramsConfig& config) {
+  if (auto valid = Validate(config); !valid) return std::move(valid).error();
+  return std::unique_ptr<GradientHistograms>(new GradientHistograms(config));
+}
+
+int GradientHistograms::dimension() const {
+  return config_.octaves * (kDescriptor + 1);
+}
+
+Result<void> GradientHistograms::Resize(const GrayImage& image, std::vector<float>& working) const {
+  if (image.width != config_.image_width || image.height != config_.image_height) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("image is {} x {} pixels, must be {} x {} as in the map",
+                             image.width,
+                             image.height,
+                             config_.image_width,
+                             config_.image_height)};
+  }
+  working.resize(static_cast<std::size_t>(config_.working_width * config_.working_height));
+  // OpenCV has no view of constant memory; nothing is written to the input.
+  const cv::Mat in(
+      image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data()));
+  cv::Mat in_float;
+  in.convertTo(in_float, CV_32F);
+  cv::Mat out(config_.working_height, config_.working_width, CV_32F, working.data());
+  const bool reduces = config_.working_width < config_.image_width;
+  cv::resize(in_float, out, out.size(), 0.0, 0.0, reduces ? cv::INTER_AREA : cv::INTER_LINEAR);
+  return {};
+}
+
+Result<void> GradientHistograms::Extract(const GrayImage& image,
+                                         std::size_t max_cells,
+                                         CellFeatures& features) {
+  if (auto resized = Resize(image, working_); !resized) return resized;
+  ExtractFromWorkingImage(working_, max_cells, features);
+  for (Eigen::Vector2f& pixel : features.pixels) {
+    pixel = FromWorking(pixel);
+  }
+  return {};
+}
+
+void GradientHistograms::ExtractFromWorkingImage(std::span<const float> working,
+                                                 std::size_t max_cells,
+                                                 CellFeatures& features) {
+  maps_.Compute(working, config_.working_width, config_.working_height, config_.octaves);
+  ChooseCells(max_cells);
+  const auto size = static_cast<std::size_t>(dimension());
+  features.dimension = dimension();
+  features.pixels.resize(cells_.size());
+  features.values.resize(cells_.size() * size);
+  for (std::size_t index = 0; index < cells_.size(); ++index) {
+    const Eigen::Vector2f centre = CellCentre(cells_[index]);
+    features.pixels[index] = centre;
+    const std::span<float> cell = std::span(features.values).subspan(index * size, size);
+    for (int octave = 0; octave < config_.octaves; ++octave) {
+      const std::span<float> histogram =
+          cell.subspan(static_cast<std::size_t>(octave * kDescriptor), kDescriptor);
+      maps_.Sample(octave, centre.x(), centre.y(), histogram);
+      cell[static_cast<std::size_t>(config_.octaves * kDescriptor + octave)] =
+          NormaliseHistogram(histogram);
+    }
+  }
+}
+
+Eigen::Vector2f GradientHistograms::CellCentre(const Cell& cell) const {
+  const int half = config_.cell_stride / 2;
+  return {static_cast<float>(cell.column * config_.cell_stride + half),
+          static_cast<float>(cell.row * config_.cell_stride + half)};
+}
+
+void GradientHistograms::ChooseCells(std::size_t max_cells) {
+  const int columns = config_.working_width / config_.cell_stride;
+  const int rows = config_.working_height / config_.cell_stride;
+  const int tile_columns = (columns + kTileCells - 1) / kTileCells;
+  const int tile_rows = (rows + kTileCells - 1) / kTileCells;
+  const auto more_texture = [](const Cell& a, const Cell& b) {
+    return std::tuple(b.texture, a.row, a.column) < std::tuple(a.texture, b.row, b.column);
+  };
+  const auto tile_limit = static_cast<std::ptrdiff_t>(
+      std::ceil(kTileShare * static_cast<double>(max_cells) / (tile_columns * tile_rows)));
+  cells_.clear();
+  for (int tile = 0; tile < tile_columns * tile_rows; ++tile) {
+    const int first_column = tile % tile_columns * kTileCells;
+    const int first_row = tile / tile_columns * kTileCells;
+    const auto tile_begin = static_cast<std::ptrdiff_t>(cells_.size());
+    for (int row = first_row; row < std::min(first_row + kTileCells, rows); ++row) {
+      for (int column = first_column; column < std::min(first_column + kTileCells, columns);
+           ++column) {
+        const Eigen::Vector2f centre = CellCentre({0.0F, column, row});
+        cells_.push_back({maps_.Texture(0, centre.x(), centre.y()), column, row});
+      }
+    }
+    if (std::ssize(cells_) - tile_begin > tile_limit) {
+      std::nth_element(cells_.begin() + tile_begin,
+                       cells_.begin() + tile_begin + tile_limit,
+                       cells_.end(),
+                       more_texture);
+      cells_.resize(static_cast<std::size_t>(tile_begin + tile_limit));
+    }
+  }
+  if (cells_.size() > max_cells) {
+    std::nth_element(cells_.begin(),
+                     cells_.begin() + static_cast<std::ptrdiff_t>(max_cells),
+                     cells_.end(),
+                     more_texture);
+    cells_.resize(max_cells);
+  }
+  std::sort(cells_.begin(), cells_.end(), [](const Cell& a, const Cell& b) {
+    return std::tuple(a.row, a.column) < std::tuple(b.row, b.column);
+  });
+}
+
+Eigen::Vector2f GradientHistograms::ToWorking(const Eigen::Vector2f& pixel) const {
+  const Eigen::Vector2f scale(
+      static_cast<float>(config_.working_width) / static_cast<float>(config_.image_width),
+      static_cast<float>(config_.working_height) / static_cast<float>(config_.image_height));
+  return ((pixel.array() + 0.5F) * scale.array() - 0.5F).matrix();
+}
+
+Eigen::Vector2f GradientHistograms::FromWorking(const Eigen::Vector2f& pixel) const {
+  const Eigen::Vector2f scale(
+      static_cast<float>(config_.working_width) / static_cast<float>(config_.image_width),
+      static_cast<float>(config_.working_height) / static_cast<float>(config_.image_height));
+  return ((pixel.array() + 0.5F) / scale.array() - 0.5F).matrix();
+}
+
+}  // namespace relocd
