@@ -1,6 +1,6 @@
 #include "messaging/message_bus.h"
 
-#include <string_view>
+#include "messaging/image_metadata.h"
 
 namespace relocd {
 
@@ -18,26 +18,10 @@ class MessageBus::RawSubscription final : public Subscription {
   RawHandler handler_;
 };
 
-namespace {
-
-std::optional<std::int64_t> FindInt64(const image_t& message, std::string_view key) {
-  for (const image_metadata_t& metadata : message.metadata) {
-    if (metadata.key != key || metadata.value.size() != sizeof(std::int64_t)) continue;
-    std::uint64_t value = 0;
-    for (const std::uint8_t byte : metadata.value)
-      value = value << 8 | byte;
-    return static_cast<std::int64_t>(value);
-  }
-  return std::nullopt;
-}
-
-}  // namespace
-
 std::optional<StreamPosition> PositionOf(const image_t& message) {
-  const auto seq = FindInt64(message, "seq");
-  const auto run_id = FindInt64(message, "run_id");
-  if (!seq || !run_id) return std::nullopt;
-  return StreamPosition{.seq = *seq, .run_id = *run_id};
+  const auto metadata = FindImageMetadata(message);
+  if (!metadata) return std::nullopt;
+  return StreamPosition{.seq = metadata->seq, .run_id = metadata->run_id};
 }
 
 MessageBus::~MessageBus() = default;
