@@ -1,5 +1,7 @@
 #include "messaging/wire_walker.h"
 
+#include <cstring>
+
 namespace relocd {
 
 bool WireWalker::Skip(std::size_t size) {
@@ -29,7 +31,9 @@ bool WireWalker::String(std::int32_t limit) {
   const std::int32_t size = ReadInt32();  // with the terminator, so never 0
   if (size < 1 || size > limit + 1) return ok_ = false;
   const std::size_t characters = static_cast<std::size_t>(size) - 1;
-  if (rest_.size() <= characters || rest_[characters] != 0) return ok_ = false;
+  if (rest_.size() <= characters) return ok_ = false;
+  const void* terminator = std::memchr(rest_.data(), 0, characters + 1);
+  if (terminator != rest_.data() + characters) return ok_ = false;
   return Skip(characters + 1);
 }
 

@@ -1,0 +1,61 @@
+#include "messaging/lcm_bus.h"
+
+#include <cstdio>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+
+namespace relocd {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(LcmBusTest, NamesTheCommandThatAddsAMissingRoute) {
+  // A network namespace of its own has no route at all. Another thread's or test's namespace stays
+  // as it is: ctest runs each test in its own process.
+  if (::unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "needs the right to make a network namespace";
+  const auto bus = LcmBus::Open("udpm://239.255.76.67:7667?ttl=0");
+  ASSERT_FALSE(bus);
+  EXPECT_EQ(bus.error().kind, ErrorKind::kUnavailable);
+  EXPECT_THAT(bus.error().message, HasSubstr("no multicast route"));
+  EXPECT_THAT(bus.error().message, HasSubstr("ip route add 239.255.76.0/24 dev lo"));
+}
+
+TEST(LcmBusTest, RefusesAnAddressThatIsNone) {
+  const auto bus = LcmBus::Open("udpm://robot:7667");
+  ASSERT_FALSE(bus);
+  EXPECT_EQ(bus.error().kind, ErrorKind::kInvalidInput);
+  EXPECT_THAT(bus.error().message, HasSubstr("'robot' is no IPv4 address"));
+}
+
+TEST(LcmBusTest, RefusesAProviderThatIsNone) {
+  const auto bus = LcmBus::Open("carrier-pigeon://");
+  ASSERT_FALSE(bus);
+  EXPECT_THAT(bus.error().message, HasSubstr("carrier-pigeon://"));
+}
+
+TEST(LcmBusTest, WritesAndReadsALogFile) {
+  const std::string path = testing::TempDir() + "lcm_bus_test.lcmlog";
+  std::remove(path.c_str());
+  {
+    auto bus = LcmBus::Open("file://" + path + "?mode=w");
+    ASSERT_TRUE(bus) << bus.error().message;
+    pose_t pose{};
+    pose.utime = 42;
+    EXPECT_TRUE((*bus)->Publish(channels::kPose, pose));
+  }
+  auto bus = LcmBus::Open("file://" + path + "?speed=0");
+  ASSERT_TRUE(bus) << bus.error().message;
+  std::int64_t utime = 0;
+  (*bus)->Subscribe<pose_t>(
+      channels::kPose, Delivery::kEvery, [&](const pose_t& pose) { utime = pose.utime; });
+  for (int i = 0; i < 10000 && utime == 0; ++i)
+    (*bus)->HandlePending();
+  EXPECT_EQ(utime, 42);
+  std::remove(path.c_str());
+}
+
+}  // namespace
+}  // namespace relocd
