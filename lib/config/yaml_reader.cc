@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "config/nearest_name.h"
+#include "core/nearest_name.h"
 #include "core/parse_number.h"
 
 namespace relocd {

@@ -1,7 +1,8 @@
-#include "config/nearest_name.h"
+#include "core/nearest_name.h"
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 namespace relocd {
 namespace {
@@ -38,6 +39,25 @@ std::string NearestName(std::string_view name, const std::vector<std::string>& c
       nearest_distance = distance;
       nearest = candidate;
     }
+  }
+  return nearest;
+}
+
+std::vector<std::string> NearestNames(std::string_view name,
+                                      std::vector<std::string> candidates,
+                                      std::size_t count) {
+  constexpr std::size_t kLongest = 128;  // as above
+  std::vector<std::pair<std::size_t, std::string>> ranked;
+  for (std::string& candidate : candidates) {
+    if (name.size() > kLongest || candidate.size() > kLongest) continue;
+    const std::size_t distance = EditDistance(name, candidate);
+    ranked.emplace_back(distance, std::move(candidate));
+  }
+  std::sort(ranked.begin(), ranked.end());
+  std::vector<std::string> nearest;
+  for (auto& [distance, candidate] : ranked) {
+    if (nearest.size() == count) break;
+    nearest.push_back(std::move(candidate));
   }
   return nearest;
 }
