@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -27,16 +30,28 @@ class LoopbackCan {
   }
 
   /// To be called once.
-  CanSocket TakeReceiver() { return CanSocket::FromFd(std::move(receiver_)); }
+  CanSocket TakeReceiver(const CanSocketOptions& options = {}) {
+    return CanSocket::FromFd(std::move(receiver_), options);
+  }
 
-  void Send(std::uint32_t id, std::initializer_list<int> data) {
+  void Send(std::uint32_t id, std::span<const std::uint8_t> data) {
     can_frame frame{};
     frame.can_id = id;
     frame.can_dlc = static_cast<std::uint8_t>(data.size());
-    std::transform(data.begin(), data.end(), frame.data, [](int byte) {
-      return static_cast<std::uint8_t>(byte);
-    });
-    EXPECT_EQ(::send(sender_.get(), &frame, sizeof(frame), 0), static_cast<ssize_t>(sizeof(frame)));
+    std::copy(data.begin(), data.end(), static_cast<std::uint8_t*>(frame.data));
+    SendRecord(&frame, sizeof(frame));
+  }
+  void Send(std::uint32_t id, std::initializer_list<int> data) {
+    std::vector<std::uint8_t> bytes;
+    for (const int byte : data)
+      bytes.push_back(static_cast<std::uint8_t>(byte));
+    Send(id, bytes);
+  }
+  void Send(const CanFrame& frame) { Send(KernelCanId(frame), frame.payload()); }
+
+  /// Any bytes, as one record.
+  void SendRecord(const void* bytes, std::size_t size) {
+    EXPECT_EQ(::send(sender_.get(), bytes, size, 0), static_cast<ssize_t>(size));
   }
 
   void Close() { sender_ = UniqueFd(); }

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "can/can_frame.h"
+#include "can/dbc.h"
+#include "core/result.h"
+
+namespace relocd {
+
+/// Whether every bit of the signal lies within `size` bytes.
+bool SignalFits(const DbcSignal& signal, std::size_t size);
+
+/// The signal's bits, the most significant first, in the low bits of the result: what a counter
+/// counts, and a checksum is. Nothing when the payload is too short.
+std::optional<std::uint64_t> DecodeBits(const DbcSignal& signal,
+                                        std::span<const std::uint8_t> payload);
+
+/// The physical value: raw * factor + offset. Nothing when the payload is too short, or the raw
+/// value is a floating-point number that is not finite.
+std::optional<double> DecodeSignal(const DbcSignal& signal, std::span<const std::uint8_t> payload);
+
+/// Whether a frame of `message` with this payload has the signal, which its multiplexor decides.
+bool IsPresent(const DbcMessage& message,
+               const DbcSignal& signal,
+               std::span<const std::uint8_t> payload);
+
+/// Writes the low bits of `bits`; the payload must be long enough. The frame's other bits stay.
+void EncodeBits(const DbcSignal& signal, std::uint64_t bits, std::span<std::uint8_t> payload);
+
+/// Writes the raw value nearest to a physical one.
+///
+/// @return kInvalidInput, naming signal, value and the range, when the signal cannot hold it.
+Result<void> EncodeSignal(const DbcSignal& signal, double value, std::span<std::uint8_t> payload);
+
+}  // namespace relocd

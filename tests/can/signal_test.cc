@@ -1,0 +1,156 @@
+#include "can/signal.h"
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace relocd {
+namespace {
+
+using testing::ElementsAre;
+
+struct DecodeCase {
+  std::string name;
+  DbcSignal signal;
+  std::vector<std::uint8_t> payload;
+  double expected;
+};
+
+class DecodeSignalTest : public testing::TestWithParam<DecodeCase> {};
+
+TEST_P(DecodeSignalTest, GivesTheValueComputedByHand) {
+  const auto value = DecodeSignal(GetParam().signal, GetParam().payload);
+  ASSERT_TRUE(value);
+  EXPECT_DOUBLE_EQ(*value, GetParam().expected);
+}
+
+TEST_P(DecodeSignalTest, IsEncodedBackToTheSameBytes) {
+  std::vector<std::uint8_t> payload(GetParam().payload.size());
+  ASSERT_TRUE(EncodeSignal(GetParam().signal, GetParam().expected, payload));
+  EXPECT_EQ(DecodeBits(GetParam().signal, payload),
+            DecodeBits(GetParam().signal, GetParam().payload));
+}
+
+constexpr ByteOrder kLittle = ByteOrder::kLittleEndian;
+constexpr ByteOrder kBig = ByteOrder::kBigEndian;
+
+INSTANTIATE_TEST_SUITE_P(
+    Signals,
+    DecodeSignalTest,
+    testing::ValuesIn(std::vector<DecodeCase>{
+        {"OneBit", {.start_bit = 3, .length = 1}, {0x08}, 1.0},
+        {"LittleEndianWord", {.start_bit = 0, .length = 16}, {0x34, 0x12}, 0x1234},
+        {"LittleEndianAcrossBytes", {.start_bit = 4, .length = 12}, {0xA0, 0xBC}, 0xBCA},
+        {"BigEndianWord", {.start_bit = 7, .length = 16, .byte_order = kBig}, {0x12, 0x34}, 0x1234},
+        {"BigEndianAcrossBytes",
+         {.start_bit = 3, .length = 12, .byte_order = kBig},
+         {0xFA, 0xBC},
+         0xABC},
+        {"SignedMinusOne", {.start_bit = 0, .length = 8, .type = RawType::kSigned}, {0xFF}, -1.0},
+        {"SignedMostNegative",
+         {.start_bit = 7, .length = 12, .byte_order = kBig, .type = RawType::kSigned},
+         {0x80, 0x00},
+         -2048.0},
+        {"FactorAndOffset",
+         {.start_bit = 0, .length = 8, .factor = 0.5, .offset = -10.0},
+         {30},
+         5.0},
+        // 0x20 is 32 km/h of 0.01 at an offset: WHEEL_SPEEDS.FR of a Toyota that stands.
+        {"ToyotaStanding",
+         {.start_bit = 6, .length = 15, .byte_order = kBig, .factor = 0.01, .offset = -67.67},
+         {0x1A, 0x6F},
+         0.01 * 0x1A6F - 67.67},
+        {"Float",
+         {.start_bit = 0, .length = 32, .type = RawType::kFloat},
+         {0x00, 0x00, 0xC0, 0x3F},
+         1.5},
+        {"BigEndianDouble",
+         {.start_bit = 7, .length = 64, .byte_order = kBig, .type = RawType::kDouble},
+         {0xC0, 0x04, 0, 0, 0, 0, 0, 0},
+         -2.5},
+    }),
+    [](const auto& instance) { return instance.param.name; });
+
+TEST(DecodeSignalTest, HasNothingOfAShortPayload) {
+  const std::vector<std::uint8_t> payload(3);
+  EXPECT_TRUE(DecodeSignal({.start_bit = 8, .length = 16}, payload));
+  EXPECT_FALSE(DecodeSignal({.start_bit = 9, .length = 16}, payload));
+  EXPECT_FALSE(DecodeSignal({.start_bit = 15, .length = 17, .byte_order = kBig}, payload));
+}
+
+TEST(DecodeSignalTest, HasNothingOfAFloatThatIsNotFinite) {
+  const std::vector<std::uint8_t> payload = {0x00, 0x00, 0xC0, 0x7F};
+  EXPECT_FALSE(DecodeSignal({.start_bit = 0, .length = 32, .type = RawType::kFloat}, payload));
+}
+
+/// Any signal that fits into 64 bytes.
+DbcSignal RandomSignal(std::mt19937& engine) {
+  DbcSignal signal;
+  signal.byte_order = engine() % 2 == 0 ? kLittle : kBig;
+  signal.type = engine() % 2 == 0 ? RawType::kUnsigned : RawType::kSigned;
+  do {
+    signal.start_bit = static_cast<int>(engine() % 512);
+    signal.length = static_cast<int>(engine() % 64) + 1;
+  } while (!SignalFits(signal, 64));
+  return signal;
+}
+
+TEST(SignalTest, DecodesTheBitsThatWereEncodedAndLeavesTheOthers) {
+  std::mt19937_64 bits_of(1);
+  std::mt19937 engine(2);
+  for (int i = 0; i < 5000; ++i) {
+    const DbcSignal signal = RandomSignal(engine);
+    const std::uint64_t mask = ~std::uint64_t{0} >> static_cast<unsigned>(64 - signal.length);
+    const std::uint64_t bits = bits_of() & mask;
+    std::array<std::uint8_t, 64> zeros{};
+    std::array<std::uint8_t, 64> ones{};
+    ones.fill(0xFF);
+    EncodeBits(signal, bits, zeros);
+    EncodeBits(signal, bits, ones);
+    ASSERT_EQ(DecodeBits(signal, zeros), bits);
+    ASSERT_EQ(DecodeBits(signal, ones), bits);
+    int differing = 0;
+    for (std::size_t k = 0; k < zeros.size(); ++k)
+      differing += __builtin_popcount(static_cast<unsigned>(zeros[k] ^ ones[k]));
+    ASSERT_EQ(differing, 512 - signal.length);
+  }
+}
+
+TEST(SignalTest, DecodesAPhysicalValueToHalfAStep) {
+  std::mt19937 engine(3);
+  for (int i = 0; i < 5000; ++i) {
+    DbcSignal signal = RandomSignal(engine);
+    signal.length = std::min(signal.length, 40);  // a double holds these
+    signal.factor = std::uniform_real_distribution<>(0.001, 3.0)(engine);
+    signal.offset = std::uniform_real_distribution<>(-100.0, 100.0)(engine);
+    const double steps = std::ldexp(1.0, signal.length - 1) - 1.0;
+    const double raw = std::uniform_real_distribution<>(0.0, std::max(steps, 0.1))(engine);
+    const double value = raw * signal.factor + signal.offset;
+    std::array<std::uint8_t, 64> payload{};
+    const auto encoded = EncodeSignal(signal, value, payload);
+    if (!encoded) continue;  // a signed single bit holds 0 and -1
+    const auto decoded = DecodeSignal(signal, payload);
+    ASSERT_TRUE(decoded);
+    ASSERT_NEAR(*decoded, value, 0.5000001 * signal.factor);
+  }
+}
+
+TEST(EncodeSignalTest, RefusesWhatTheSignalCannotHold) {
+  std::array<std::uint8_t, 1> payload{};
+  const DbcSignal byte{.name = "SPEED", .start_bit = 0, .length = 8, .factor = 0.5};
+  EXPECT_TRUE(EncodeSignal(byte, 127.5, payload));
+  EXPECT_THAT(payload, ElementsAre(0xFF));
+  EXPECT_EQ(EncodeSignal(byte, 128.0, payload).error().message,
+            "signal SPEED cannot hold 128, must be within 8 bits at 0.5 each and 0");
+  EXPECT_FALSE(EncodeSignal(byte, -0.5, payload));
+  EXPECT_FALSE(EncodeSignal(byte, std::nan(""), payload));
+  EXPECT_THAT(payload, ElementsAre(0xFF));
+}
+
+}  // namespace
+}  // namespace relocd
