@@ -4,13 +4,11 @@
 
 #include <utility>
 
-#include <stdlib.h>
 
 #include "can/can_socket.h"
 #include "can/candump_source.h"
 #include "can/socket_can_source.h"
 #include "core/file.h"
-#include "core/parse_number.h"
 
 namespace relocd {
 namespace {
@@ -46,13 +44,6 @@ std::unique_ptr<CanSource> MakeCanSource(const CanConfig& config,
   }
   return std::make_unique<SocketCanSource>(
       config.interface, [=] { return CanSocket::Open(config.interface, options); });
-}
-
-MonotonicTime PlaybackEpoch(MonotonicTime now) {
-  // Read once, before any thread could change the environment.
-  const char* text = ::getenv("RELOCD_PLAYBACK_EPOCH_NS");  // NOLINT(concurrency-mt-unsafe)
-  const auto epoch_ns = text == nullptr ? std::nullopt : ParseInt64(text);
-  return epoch_ns ? FromNanoseconds(*epoch_ns) : now;
 }
 
 }  // namespace relocd

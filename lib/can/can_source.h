@@ -50,13 +50,9 @@ class CanSource {
 /// The source that the config asks for, not yet opened.
 ///
 /// @param ids  the frames that are wanted; empty for all.
-/// @param epoch  candump: the time of `playback_start_s`.
+/// @param epoch  candump: the time of `playback_start_s` (core/playback_epoch.h).
 std::unique_ptr<CanSource> MakeCanSource(const CanConfig& config,
                                          std::vector<CanId> ids,
                                          MonotonicTime epoch);
-
-/// When the recordings that are played at once begin: RELOCD_PLAYBACK_EPOCH_NS of the environment,
-/// which the supervisor sets once for all its children, or else `now`.
-MonotonicTime PlaybackEpoch(MonotonicTime now);
 
 }  // namespace relocd
