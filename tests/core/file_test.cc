@@ -1,0 +1,55 @@
+#include "core/file.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace relocd {
+namespace {
+
+using testing::HasSubstr;
+
+class FileTest : public testing::Test {
+ protected:
+  FileTest() { std::filesystem::create_directories(folder_); }
+  ~FileTest() override { std::filesystem::remove_all(folder_); }
+
+  std::string folder_ = testing::TempDir() + "relocd_file_test";
+};
+
+TEST_F(FileTest, ReadsBackWhatWasWritten) {
+  const std::string bytes("a\0b\xFF\n", 5);
+  ASSERT_TRUE(WriteFileAtomically(folder_ + "/state", bytes));
+  EXPECT_EQ(ReadFile(folder_ + "/state").value(), bytes);
+  ASSERT_TRUE(WriteFileAtomically(folder_ + "/state", "new"));
+  EXPECT_EQ(ReadFile(folder_ + "/state").value(), "new");
+}
+
+TEST_F(FileTest, LeavesNothingBesideTheFile) {
+  ASSERT_TRUE(WriteFileAtomically(folder_ + "/state", "x"));
+  const auto files = std::filesystem::directory_iterator(folder_);
+  EXPECT_EQ(std::distance(begin(files), end(files)), 1);
+}
+
+TEST_F(FileTest, KeepsTheOldFileWhenTheNewOneCannotTakeItsPlace) {
+  std::filesystem::create_directory(folder_ + "/state");  // a folder cannot be renamed over
+  std::filesystem::create_directory(folder_ + "/state/inside");
+  const auto ok = WriteFileAtomically(folder_ + "/state", "x");
+  ASSERT_FALSE(ok);
+  EXPECT_THAT(ok.error().message, HasSubstr("/state"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ + "/state/inside"));
+  const auto files = std::filesystem::directory_iterator(folder_);
+  EXPECT_EQ(std::distance(begin(files), end(files)), 1);
+}
+
+TEST_F(FileTest, NamesWhatItCannotOpen) {
+  const auto missing = ReadFile(folder_ + "/none");
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().kind, ErrorKind::kUnavailable);
+  EXPECT_THAT(missing.error().message, HasSubstr("/none: No such file or directory"));
+}
+
+}  // namespace
+}  // namespace relocd
