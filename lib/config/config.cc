@@ -26,7 +26,9 @@ Error Locate(Error error, const std::string& path, const YamlReader::Lines& line
   std::string key = error.message.substr(0, error.message.find(' '));
   while (!key.empty()) {
     if (const auto found = lines.find(key); found != lines.end()) {
-      return std::move(error).WithContext(fmt::format("{}: line {}", path, found->second));
+      const std::string where =
+          found->second == 0 ? "--set" : fmt::format("{}: line {}", path, found->second);
+      return std::move(error).WithContext(where);
     }
     const auto dot = key.rfind('.');
     key.resize(dot == std::string::npos ? 0 : dot);
@@ -53,7 +55,8 @@ Result<void> Config::Validate() const {
     const Error error = std::move(ok).error();
     return Error{error.kind, fmt::format("{}.{}", section, error.message)};
   };
-  return check("bus", bus);
+  if (auto ok = check("bus", bus); !ok) return ok;
+  return check("recorder", recorder);
 }
 
 Result<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides) {
@@ -62,6 +65,9 @@ Result<Config> LoadConfig(const std::string& path, const std::vector<std::string
   Config config;
   auto lines = YamlReader::ReadText(*text, path, overrides, config);
   if (!lines) return std::move(lines).error();
+  for (const std::string& text_override : overrides) {
+    (*lines)[text_override.substr(0, text_override.find('='))] = 0;
+  }
   if (auto ok = config.Validate(); !ok) return Locate(std::move(ok).error(), path, *lines);
   return config;
 }

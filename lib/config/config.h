@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "recording/recorder_config.h"
 
 namespace relocd {
 
@@ -24,10 +25,12 @@ struct BusConfig {
 /// All that a robot's YAML file says: the modules' structs, put together.
 struct Config {
   BusConfig bus;
+  RecorderConfig recorder;
 
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("bus", self.bus, "The LCM networks between the daemons.");
+    visit("recorder", self.recorder, "recorderd: what is kept of the messages.");
   }
 
   /// @return kInvalidInput; the message begins with the full name of the key.

@@ -1,71 +1,87 @@
 #include "recording/log_reader.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <unistd.h>
 
-#include <array>
-#include <system_error>
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "core/file.h"
+
 namespace relocd {
 namespace {
 
-template <typename Number>
-Number ReadBigEndian(const char* bytes) {
-  Number number = 0;
-  for (std::size_t i = 0; i < sizeof(Number); ++i) {
-    number = static_cast<Number>(number << 8 | static_cast<std::uint8_t>(bytes[i]));
-  }
-  return number;
-}
+constexpr std::size_t kChunkSize = std::size_t{1} << 20;
+constexpr std::size_t kSyncSize = 4;
 
 }  // namespace
 
 Result<LogReader> LogReader::Open(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    return Error{ErrorKind::kUnavailable,
-                 fmt::format("opening log {}: {}", path, std::generic_category().message(errno))};
+  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!fd.valid()) return SystemError(ErrorKind::kUnavailable, fmt::format("opening log {}", path));
+  return LogReader(std::move(fd));
+}
+
+bool LogReader::Has(std::size_t size) {
+  while (buffer_.size() - begin_ < size) {
+    buffer_.erase(0, std::exchange(begin_, 0));
+    const std::size_t old_size = buffer_.size();
+    buffer_.resize(old_size + kChunkSize);
+    const ssize_t count = ::read(fd_.get(), buffer_.data() + old_size, kChunkSize);
+    buffer_.resize(old_size + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    if (count == 0 || (count < 0 && errno != EINTR)) return false;
   }
-  return LogReader(std::move(file));
+  return true;
+}
+
+std::uint64_t LogReader::BigEndianAt(std::size_t offset, std::size_t size) const {
+  std::uint64_t number = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    number = number << 8 | static_cast<std::uint8_t>(buffer_[begin_ + offset + i]);
+  }
+  return number;
 }
 
 std::optional<LogEvent> LogReader::ReadEvent() {
   using namespace log_format;
-  std::array<char, kHeaderSize> header{};
-  if (!file_.read(header.data(), header.size())) return std::nullopt;
-  if (ReadBigEndian<std::uint32_t>(header.data()) != kSyncWord) return std::nullopt;
-  const auto channel_size = ReadBigEndian<std::uint32_t>(header.data() + 20);
-  const auto data_size = ReadBigEndian<std::uint32_t>(header.data() + 24);
+  if (!Has(kHeaderSize) || BigEndianAt(0, kSyncSize) != kSyncWord) return std::nullopt;
+  const std::size_t channel_size = BigEndianAt(20, 4);
+  const std::size_t data_size = BigEndianAt(24, 4);
   if (channel_size == 0 || channel_size > kMaxChannelSize || data_size > kMaxDataSize) {
     return std::nullopt;
   }
+  const std::size_t event_size = kHeaderSize + channel_size + data_size;
+  if (!Has(event_size)) return std::nullopt;
+  const bool another_follows = Has(event_size + kSyncSize);
+  if (another_follows ? BigEndianAt(event_size, kSyncSize) != kSyncWord : Has(event_size + 1)) {
+    return std::nullopt;
+  }
   LogEvent event;
-  event.number = ReadBigEndian<std::int64_t>(header.data() + 4);
-  event.timestamp_us = ReadBigEndian<std::int64_t>(header.data() + 12);
-  event.channel.resize(channel_size);
-  event.data.resize(data_size);
-  if (!file_.read(event.channel.data(), channel_size)) return std::nullopt;
-  if (!file_.read(reinterpret_cast<char*>(event.data.data()), data_size)) return std::nullopt;
+  event.number = static_cast<std::int64_t>(BigEndianAt(4, 8));
+  event.timestamp_us = static_cast<std::int64_t>(BigEndianAt(12, 8));
+  event.channel = buffer_.substr(begin_ + kHeaderSize, channel_size);
+  const auto* data =
+      reinterpret_cast<const std::uint8_t*>(buffer_.data()) + begin_ + kHeaderSize + channel_size;
+  event.data.assign(data, data + data_size);
+  begin_ += event_size;
   return event;
 }
 
 std::optional<LogEvent> LogReader::Next() {
   bool damaged = false;
-  while (true) {
-    file_.clear();
-    const auto begin = file_.tellg();
-    if (file_.peek() == std::ifstream::traits_type::eof()) return std::nullopt;
+  while (Has(1)) {
     if (auto event = ReadEvent()) {
       ++counters_.events;
       return event;
     }
     if (!std::exchange(damaged, true)) ++counters_.damaged_places;
     ++counters_.skipped_bytes;
-    file_.clear();
-    file_.seekg(begin + std::streamoff{1});
+    ++begin_;
   }
+  return std::nullopt;
 }
 
 }  // namespace relocd

@@ -1,11 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
-#include <fstream>
 #include <optional>
 #include <string>
 
 #include "core/result.h"
+#include "core/unique_fd.h"
 #include "recording/log_event.h"
 
 namespace relocd {
@@ -28,13 +29,19 @@ class LogReader {
   [[nodiscard]] const Counters& counters() const { return counters_; }
 
  private:
-  explicit LogReader(std::ifstream file) : file_(std::move(file)) {}
+  explicit LogReader(UniqueFd fd) : fd_(std::move(fd)) {}
 
-  /// The event that begins at the file's position; nothing, with the position unspecified, if none
-  /// does.
+  /// The whole event that begins where we are, with another one or the end of the file behind it: a
+  /// damaged length would otherwise swallow what follows.
   std::optional<LogEvent> ReadEvent();
 
-  std::ifstream file_;
+  /// Whether `size` bytes follow where we are, after reading more of the file if need be.
+  bool Has(std::size_t size);
+  [[nodiscard]] std::uint64_t BigEndianAt(std::size_t offset, std::size_t size) const;
+
+  UniqueFd fd_;
+  std::string buffer_;     ///< A part of the file.
+  std::size_t begin_ = 0;  ///< Where we are, in the buffer.
   Counters counters_;
 };
 
