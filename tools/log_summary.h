@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "messaging/stream_monitor.h"
+#include "recording/log_event.h"
+#include "recording/log_reader.h"
+
+namespace relocd {
+
+/// What each channel of a log holds.
+class LogSummary {
+ public:
+  void Add(const LogEvent& event);
+
+  [[nodiscard]] std::string FormatTable(const LogReader::Counters& counters) const;
+  [[nodiscard]] std::string FormatJson(const LogReader::Counters& counters) const;
+
+ private:
+  struct ChannelSummary {
+    std::int64_t events = 0;
+    std::int64_t bytes = 0;
+    std::int64_t first_us = 0;
+    std::int64_t last_us = 0;
+    StreamMonitor monitor;
+    /// From the measurement (utime) to its arrival at the recorder, us.
+    std::vector<std::int64_t> ages_us;
+  };
+  std::map<std::string, ChannelSummary> channels_;
+};
+
+}  // namespace relocd

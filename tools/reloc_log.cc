@@ -1,0 +1,93 @@
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/core.h>
+
+#include "core/exit_code.h"
+#include "log_csv.h"
+#include "log_summary.h"
+#include "recording/log_reader.h"
+
+// reloc log: what is in a recording, and its messages as tables.
+
+namespace relocd {
+namespace {
+
+Result<int> Info(const std::string& path, bool json) {
+  auto reader = LogReader::Open(path);
+  if (!reader) return std::move(reader).error();
+  LogSummary summary;
+  while (const auto event = reader->Next()) summary.Add(*event);
+  fmt::print("{}", json ? summary.FormatJson(reader->counters()) : summary.FormatTable(reader->counters()));
+  return kExitOk;
+}
+
+struct ExportOptions {
+  std::string log;
+  std::string channel;
+  std::string out;
+  std::int64_t time_origin_ns = 0;
+};
+
+Result<int> Export(const ExportOptions& options) {
+  auto reader = LogReader::Open(options.log);
+  if (!reader) return std::move(reader).error();
+  auto csv = LogCsv::ForChannel(options.channel, options.time_origin_ns);
+  if (!csv) return std::move(csv).error();
+  std::string text = csv->Header();
+  std::int64_t undecodable = 0;
+  while (const auto event = reader->Next()) {
+    if (event->channel != options.channel) continue;
+    if (!csv->AppendRow(event->data, text)) ++undecodable;
+  }
+  if (undecodable > 0) {
+    fmt::print(stderr, "{}: {} messages on {} do not decode\n", options.log, undecodable, options.channel);
+  }
+  std::ofstream out(options.out, std::ios::binary);
+  out << text;
+  if (!out.flush()) {
+    return Error{ErrorKind::kUnavailable, fmt::format("writing {}: failed", options.out)};
+  }
+  return kExitOk;
+}
+
+int Finish(const Result<int>& result) {
+  if (result) return *result;
+  fmt::print(stderr, "reloc log: {}\n", result.error().message);
+  return ExitCode(result.error());
+}
+
+}  // namespace
+}  // namespace relocd
+
+int main(int argc, char** argv) {
+  CLI::App app("What is in a recording, and its messages as tables.", "reloc log");
+  app.require_subcommand(1);
+
+  std::string path;
+  bool json = false;
+  auto* info = app.add_subcommand("info", "channels, counts, rates, losses, latencies");
+  info->add_option("log", path, "a log of lcm-logger or recorderd")->required();
+  info->add_flag("--json", json, "for scripts");
+
+  relocd::ExportOptions options;
+  auto* exporting = app.add_subcommand("export", "one channel as CSV");
+  exporting->add_option("log", options.log, "a log of lcm-logger or recorderd")->required();
+  exporting->add_option("--channel", options.channel, relocd::LogCsv::kChannels)->required();
+  exporting->add_option("--out", options.out, "the CSV file")->required();
+  exporting->add_option("--time-origin-ns", options.time_origin_ns, "taken off every mono_ns");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? relocd::kExitOk : relocd::kExitUsage;
+  }
+  return relocd::Finish(*info ? relocd::Info(path, json) : relocd::Export(options));
+}
