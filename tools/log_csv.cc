@@ -32,18 +32,21 @@ void AppendPose(std::int64_t time_ns, const PlanarPose& pose, int status, std::s
                  status);
 }
 
-bool AppendLocalization(std::span<const std::uint8_t> bytes, std::int64_t origin_ns, std::string& text) {
+bool AppendLocalization(std::span<const std::uint8_t> bytes,
+                        std::int64_t origin_ns,
+                        std::string& text) {
   const auto message = DecodeBounded<localization_t>(bytes);
   if (!message) return false;
   if (message->status == localization_t::UNINITIALISED) return true;
-  const PlanarPose pose{
-      .X_WB = Pose2(message->x_WB_m, message->y_WB_m, message->yaw_WB_rad),
-      .covariance = Eigen::Map<const RowMajorMatrix3d>(&message->covariance[0])};
+  const PlanarPose pose{.X_WB = Pose2(message->x_WB_m, message->y_WB_m, message->yaw_WB_rad),
+                        .covariance = Eigen::Map<const RowMajorMatrix3d>(&message->covariance[0])};
   AppendPose(message->mono_ns - origin_ns, pose, message->status, text);
   return true;
 }
 
-bool AppendOdometry(std::span<const std::uint8_t> bytes, std::int64_t origin_ns, std::string& text) {
+bool AppendOdometry(std::span<const std::uint8_t> bytes,
+                    std::int64_t origin_ns,
+                    std::string& text) {
   const auto message = DecodeBounded<odometry_t>(bytes);
   if (!message) return false;
   const PlanarPose pose{.X_WB = Pose2(message->x_OB_m, message->y_OB_m, message->yaw_OB_rad)};
@@ -51,7 +54,9 @@ bool AppendOdometry(std::span<const std::uint8_t> bytes, std::int64_t origin_ns,
   return true;
 }
 
-bool AppendCameraPose(std::span<const std::uint8_t> bytes, std::int64_t origin_ns, std::string& text) {
+bool AppendCameraPose(std::span<const std::uint8_t> bytes,
+                      std::int64_t origin_ns,
+                      std::string& text) {
   const auto message = DecodeBounded<camera_pose_t>(bytes);
   if (!message) return false;
   if (message->status != camera_pose_t::STATUS_OK) return true;

@@ -9,10 +9,12 @@
 
 namespace relocd {
 
-/// Writes the messages of one channel as rows of `time_ns,x_m,y_m,heading_rad,cov_xx,...,cov_tt,status`, which reloc eval reads.
+/// Writes the messages of one channel as rows of
+/// `time_ns,x_m,y_m,heading_rad,cov_xx,...,cov_tt,status`, which reloc eval reads.
 ///
-/// LOCALIZATION gives X_WB; ODOMETRY gives X_OB, with zeros for the covariance, which it does not carry; CAMERA_POSE gives where
-/// the camera stands and where it looks (X_WC in the plane), one row for each pose that was found.
+/// LOCALIZATION gives X_WB; ODOMETRY gives X_OB, with zeros for the covariance, which it does not
+/// carry; CAMERA_POSE gives where the camera stands and where it looks (X_WC in the plane), one row
+/// for each pose that was found.
 class LogCsv {
  public:
   static constexpr const char* kChannels = "LOCALIZATION, ODOMETRY or CAMERA_POSE";

@@ -110,18 +110,19 @@ std::string LogSummary::FormatJson(const LogReader::Counters& counters) const {
   const char* separator = "";
   for (const auto& [name, channel] : channels_) {
     const auto& stream = channel.monitor.counters();
-    fmt::format_to(std::back_inserter(text),
-                   "{}\"{}\":{{\"events\":{},\"bytes\":{},\"first_us\":{},\"last_us\":{},\"lost\":{},"
-                   "\"repeated\":{},\"restarts\":{}",
-                   separator,
-                   name,
-                   channel.events,
-                   channel.bytes,
-                   channel.first_us,
-                   channel.last_us,
-                   stream.lost,
-                   stream.repeated,
-                   stream.restarts);
+    fmt::format_to(
+        std::back_inserter(text),
+        "{}\"{}\":{{\"events\":{},\"bytes\":{},\"first_us\":{},\"last_us\":{},\"lost\":{},"
+        "\"repeated\":{},\"restarts\":{}",
+        separator,
+        name,
+        channel.events,
+        channel.bytes,
+        channel.first_us,
+        channel.last_us,
+        stream.lost,
+        stream.repeated,
+        stream.restarts);
     if (!channel.ages_us.empty()) {
       fmt::format_to(std::back_inserter(text),
                      ",\"age_p50_ms\":{},\"age_p99_ms\":{},\"age_max_ms\":{}",

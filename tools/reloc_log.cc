@@ -24,8 +24,11 @@ Result<int> Info(const std::string& path, bool json) {
   auto reader = LogReader::Open(path);
   if (!reader) return std::move(reader).error();
   LogSummary summary;
-  while (const auto event = reader->Next()) summary.Add(*event);
-  fmt::print("{}", json ? summary.FormatJson(reader->counters()) : summary.FormatTable(reader->counters()));
+  while (const auto event = reader->Next())
+    summary.Add(*event);
+  fmt::print(
+      "{}",
+      json ? summary.FormatJson(reader->counters()) : summary.FormatTable(reader->counters()));
   return kExitOk;
 }
 
@@ -48,7 +51,8 @@ Result<int> Export(const ExportOptions& options) {
     if (!csv->AppendRow(event->data, text)) ++undecodable;
   }
   if (undecodable > 0) {
-    fmt::print(stderr, "{}: {} messages on {} do not decode\n", options.log, undecodable, options.channel);
+    fmt::print(
+        stderr, "{}: {} messages on {} do not decode\n", options.log, undecodable, options.channel);
   }
   std::ofstream out(options.out, std::ios::binary);
   out << text;
