@@ -1,6 +1,8 @@
 #include "config/config.h"
 
+#include <filesystem>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -36,6 +38,17 @@ Error Locate(Error error, const std::string& path, const YamlReader::Lines& line
   return std::move(error).WithContext(path);
 }
 
+/// Paths in a config are relative to its folder.
+void CompletePath(const std::filesystem::path& directory, std::string& path) {
+  if (!path.empty()) path = (directory / path).lexically_normal().string();
+}
+
+void CompletePaths(const std::filesystem::path& directory, Config& config) {
+  CompletePath(directory, config.can.path);
+  CompletePath(directory, config.can.dbc_file);
+  CompletePath(directory, config.recorder.directory);
+}
+
 }  // namespace
 
 Result<void> BusConfig::Validate() const {
@@ -56,7 +69,9 @@ Result<void> Config::Validate() const {
     return Error{error.kind, fmt::format("{}.{}", section, error.message)};
   };
   if (auto ok = check("bus", bus); !ok) return ok;
-  return check("recorder", recorder);
+  if (auto ok = check("can", can); !ok) return ok;
+  if (auto ok = check("recorder", recorder); !ok) return ok;
+  return check("supervisor", supervisor);
 }
 
 Result<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides) {
@@ -69,6 +84,8 @@ Result<Config> LoadConfig(const std::string& path, const std::vector<std::string
     (*lines)[text_override.substr(0, text_override.find('='))] = 0;
   }
   if (auto ok = config.Validate(); !ok) return Locate(std::move(ok).error(), path, *lines);
+  std::error_code no_error;  // a path that cannot be made absolute stays as it is
+  CompletePaths(std::filesystem::absolute(path, no_error).parent_path(), config);
   return config;
 }
 

@@ -3,8 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "can/can_config.h"
 #include "core/result.h"
 #include "recording/recorder_config.h"
+#include "supervision/process_spec.h"
 
 namespace relocd {
 
@@ -25,12 +27,16 @@ struct BusConfig {
 /// All that a robot's YAML file says: the modules' structs, put together.
 struct Config {
   BusConfig bus;
+  CanConfig can;
   RecorderConfig recorder;
+  SupervisionConfig supervisor;
 
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("bus", self.bus, "The LCM networks between the daemons.");
+    visit("can", self.can, "odometryd: where the vehicle's CAN frames come from.");
     visit("recorder", self.recorder, "recorderd: what is kept of the messages.");
+    visit("supervisor", self.supervisor, "relocd: the daemons it starts and watches.");
   }
 
   /// @return kInvalidInput; the message begins with the full name of the key.

@@ -9,7 +9,8 @@ namespace relocd {
 namespace {
 
 constexpr int kIndent = 2;
-constexpr std::size_t kCommentColumn = 44;
+constexpr std::size_t kCommentColumn = 36;
+constexpr std::size_t kMaxColumn = 110;
 
 }  // namespace
 
@@ -50,11 +51,14 @@ void YamlWriter::WriteLine(const std::string& name,
                            const std::string& value,
                            const std::string& comment,
                            int depth) {
-  std::string line(static_cast<std::size_t>(depth * kIndent), ' ');
-  line += name + ": " + value;
-  if (!comment.empty()) {
-    line.resize(std::max(line.size() + 2, kCommentColumn), ' ');
+  const std::string indent(static_cast<std::size_t>(depth * kIndent), ' ');
+  std::string line = indent + name + ": " + value;
+  const std::size_t column = std::max(line.size() + 2, kCommentColumn);
+  if (!comment.empty() && column + comment.size() <= kMaxColumn) {
+    line.resize(column, ' ');
     line += "# " + comment;
+  } else if (!comment.empty()) {
+    fmt::format_to(std::back_inserter(text_), "{}# {}\n", indent, comment);
   }
   text_ += line + "\n";
 }

@@ -1,0 +1,81 @@
+#include "config/config.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/file.h"
+
+namespace relocd {
+namespace {
+
+using testing::HasSubstr;
+
+class ConfigTest : public testing::Test {
+ protected:
+  ~ConfigTest() override { std::filesystem::remove(path_); }
+
+  Result<Config> Load(const std::string& text, const std::vector<std::string>& overrides = {}) {
+    EXPECT_TRUE(WriteFileAtomically(path_, text));
+    return LoadConfig(path_, overrides);
+  }
+
+  std::string path_ = testing::TempDir() + "relocd_config_test.yaml";
+};
+
+TEST_F(ConfigTest, TheDefaultsAreValid) {
+  const auto ok = Config().Validate();
+  EXPECT_TRUE(ok) << ok.error().message;
+}
+
+TEST_F(ConfigTest, TheShippedFileHasEveryKeyAtItsDefault) {
+  const auto shipped = ReadFile(RELOCD_SOURCE_DIR "/config/robot.yaml");
+  ASSERT_TRUE(shipped) << shipped.error().message;
+  EXPECT_THAT(*shipped, testing::EndsWith(FormatConfig(Config())))
+      << "renew it: (sed '/^$/q' config/robot.yaml; reloc check-config --defaults)";
+}
+
+TEST_F(ConfigTest, ReadsBackWhatItFormats) {
+  const std::string text = FormatConfig(Config());
+  const auto config = Load(text);
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(ConfigHash(*config), ConfigHash(Config()));
+}
+
+TEST_F(ConfigTest, NamesTheLineOfAValueOutOfRange) {
+  const auto config = Load("bus:\n  # comment\nrecorder:\n  flush_s: 0\n");
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().message, path_ + ": line 4: recorder.flush_s is 0, must be in (0, 60]");
+  EXPECT_EQ(config.error().kind, ErrorKind::kInvalidInput);
+}
+
+TEST_F(ConfigTest, NamesAnOverrideOutOfRange) {
+  const auto config = Load("", {"recorder.flush_s=0"});
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().message, "--set: recorder.flush_s is 0, must be in (0, 60]");
+}
+
+TEST_F(ConfigTest, RefusesNetworksThatWouldHearEachOther) {
+  const auto config = Load("bus:\n  image_url: udpm://239.1.1.1:7667?ttl=0\n");
+  ASSERT_FALSE(config);
+  EXPECT_THAT(config.error().message, HasSubstr("bus.image_url has port 7667 as control_url has"));
+}
+
+TEST_F(ConfigTest, PathsAreRelativeToTheFile) {
+  const auto config = Load("can: {dbc_file: vehicles/rover.dbc}\nrecorder: {directory: /log}\n");
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->can.dbc_file,
+            std::filesystem::path(path_).parent_path() / "vehicles/rover.dbc");
+  EXPECT_EQ(config->recorder.directory, "/log");
+}
+
+TEST_F(ConfigTest, AMissingFileIsNotABadOne) {
+  const auto config = LoadConfig("/nonexistent/robot.yaml", {});
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().kind, ErrorKind::kUnavailable);
+}
+
+}  // namespace
+}  // namespace relocd
