@@ -76,7 +76,11 @@ Result<void> EventLoop::Run() {
     if (count < 0 && errno != EINTR) return SystemError("waiting for events");
     for (int i = 0; i < count && running_; ++i) {
       const int fd = events.at(static_cast<std::size_t>(i)).data.fd;
-      if (fd == signals_.get()) return {};
+      if (fd == signals_.get()) {
+        signalfd_siginfo taken{};  // so that Run can be called again, to stop in an orderly way
+        static_cast<void>(::read(fd, &taken, sizeof(taken)));
+        return {};
+      }
       handlers_.at(fd)();
     }
   }
