@@ -4,17 +4,14 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <cstdlib>
-#include <optional>
 #include <utility>
-#include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
 #include "core/exit_code.h"
 #include "core/file.h"
 #include "core/parse_number.h"
+#include "daemon/daemon_options.h"
 #include "messaging/lcm_bus.h"
 
 namespace relocd {
@@ -24,48 +21,10 @@ constexpr Duration kStatusPeriod = std::chrono::seconds(1);
 constexpr int kPriorityError = 3;
 constexpr int kPriorityNotice = 5;
 
-struct Options {
-  std::string config_path = "/etc/relocd/robot.yaml";
-  std::vector<std::string> overrides;
-  bool check_config = false;
-  bool print_config = false;
-  std::string instance;
-};
-
-/// @return an exit code when the process is to end here.
-std::optional<int> ParseCommandLine(int argc,
-                                    char** argv,
-                                    const DaemonInfo& info,
-                                    Options& options) {
-  CLI::App app(info.description, info.name);
-  std::string control_url;
-  std::string image_url;
-  app.add_option("--config", options.config_path, "the robot's YAML file")->capture_default_str();
-  app.add_option("--set", options.overrides, "section.key=value, put over the file's")
-      ->allow_extra_args(false);
-  app.add_flag("--check-config", options.check_config, "only check the config: exit 0, or 78");
-  app.add_flag("--print-config", options.print_config, "print the effective config, every key");
-  app.add_option("--lcm-url", control_url, "put over bus.control_url");
-  app.add_option("--image-lcm-url", image_url, "put over bus.image_url");
-  app.set_version_flag("--version", info.name + " " RELOCD_VERSION);
-  if (!info.instance_option.empty()) {
-    app.add_option("--" + info.instance_option, options.instance, "which of the config's")
-        ->required();
-  }
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitOk : kExitUsage;
-  }
-  if (!control_url.empty()) options.overrides.push_back("bus.control_url=" + control_url);
-  if (!image_url.empty()) options.overrides.push_back("bus.image_url=" + image_url);
-  return std::nullopt;
-}
-
 /// What surrounds the daemon: publishes its status, feeds the watchdog, hands on messages.
 class Frame {
  public:
-  Frame(const Config& config, const DaemonInfo& info, const Options& options)
+  Frame(const Config& config, const DaemonInfo& info, const DaemonOptions& options)
       : config_(config),
         name_(info.instance_option.empty() ? info.name : info.name + "_" + options.instance),
         instance_(options.instance),
@@ -172,7 +131,7 @@ int RunDaemon(int argc,
               char** argv,
               const DaemonInfo& info,
               const std::function<Result<std::unique_ptr<Daemon>>(DaemonContext&)>& make) {
-  Options options;
+  DaemonOptions options;
   if (const auto exit_code = ParseCommandLine(argc, argv, info, options)) return *exit_code;
   const auto config = LoadConfig(options.config_path, options.overrides);
   if (!config) {

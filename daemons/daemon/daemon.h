@@ -8,6 +8,7 @@
 #include "config/config.h"
 #include "core/result.h"
 #include "core/time.h"
+#include "daemon/daemon_options.h"
 #include "messaging/message_bus.h"
 #include "messaging/node_status.h"
 #include "runtime/event_loop.h"
@@ -41,14 +42,6 @@ class Daemon {
 
   /// Called once when the process was asked to end, before the loop's last round is over.
   virtual void Stop(const ClockReading& /*now*/) {}
-};
-
-struct DaemonInfo {
-  std::string name;             ///< "odometryd"
-  std::string description;      ///< For --help.
-  bool uses_images = false;     ///< Opens the image network too.
-  std::string instance_option;  ///< "camera" adds a required --camera NAME; the daemon is then
-                                ///< called name_NAME.
 };
 
 /// The main function of a daemon: reads the command line (--config, --set, --check-config,
