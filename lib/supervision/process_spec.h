@@ -27,28 +27,26 @@ struct ProcessConfig {
     visit("enabled", self.enabled, "false: not started");
     visit("command",
           self.command,
-          "program and its arguments; without a slash: beside relocd; empty: the daemon of this "
-          "name");
+          "program and arguments, without a slash beside relocd; empty: the daemon of this name");
     visit("after",
           self.after,
-          "starts once these are ready, have failed, or took longer than their start_timeout_s");
+          "starts when these are ready, have failed, or had their start_timeout_s");
     visit("watchdog_s",
           self.watchdog_s,
-          "0 or in [0.1, 3600]; ended and started again when it gave no sign of life for so long; "
-          "0: not watched");
+          "0 or in [0.1, 3600]; restarted after so long without a sign of life; 0: not watched");
     visit("start_timeout_s",
           self.start_timeout_s,
-          "in [0.1, 3600]; until its first sign of life, and how long others wait for it");
+          "in [0.1, 3600]; for its first sign of life, and how long others wait for it");
     visit("stop_timeout_s",
           self.stop_timeout_s,
-          "in [0.1, 10]; from SIGTERM to SIGKILL; the tiers' longest ones add up to 10 at most");
+          "in [0.1, 10]; from SIGTERM to SIGKILL; all tiers together: 10 at most");
     visit("stop_tier", self.stop_tier, "in [0, 9]; lower ones are stopped first");
     visit("scheduling", self.scheduling, "other or fifo (real time)");
     visit("priority", self.priority, "fifo: in [1, 99]; other: 0");
     visit("nice", self.nice, "in [-20, 19]; other: higher ones yield");
     visit("rss_limit_mb",
           self.rss_limit_mb,
-          ">= 0; started again when its resident memory is above; 0: no limit");
+          ">= 0; restarted when its resident memory is above; 0: no limit");
   }
 
   /// @return kInvalidInput, naming the field, its value and what is allowed.
