@@ -92,19 +92,19 @@ std::optional<Eigen::Vector2d> PinholeCamera::Unproject(const Eigen::Vector2d& p
   // Newton converges quadratically: 20 steps are far more than any pixel in front of the fold
   // needs.
   constexpr int kMaxSteps = 20;
-  constexpr double kTolerance = 1e-12;
+  constexpr double kTolerance = 1e-7;  // of a step: the error after it is about its square
   Eigen::Vector2d undistorted = target;
   // A start behind the fold would converge to the wrong branch, or not at all.
   if (undistorted.norm() >= max_radius_) undistorted *= 0.5 * max_radius_ / undistorted.norm();
   for (int step = 0; step < kMaxSteps; ++step) {
     const Distorted distorted = Distort(undistorted);
-    const Eigen::Vector2d error = target - distorted.point;
-    if (error.norm() < kTolerance) {
+    const Eigen::Vector2d correction = distorted.J.inverse() * (target - distorted.point);
+    undistorted += correction;
+    if (!undistorted.allFinite()) return std::nullopt;
+    if (correction.squaredNorm() < kTolerance * kTolerance) {
       if (undistorted.norm() >= max_radius_) return std::nullopt;
       return undistorted;
     }
-    undistorted += distorted.J.inverse() * error;
-    if (!undistorted.allFinite()) return std::nullopt;
   }
   return std::nullopt;
 }
