@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -11,6 +12,23 @@ namespace {
 constexpr int kIndent = 2;
 constexpr std::size_t kCommentColumn = 36;
 constexpr std::size_t kMaxColumn = 110;
+
+/// Comment lines of at most kMaxColumn columns, broken between words.
+std::string FormatComment(std::string_view comment, const std::string& indent) {
+  std::string text;
+  std::string line = indent + "#";
+  while (!comment.empty()) {
+    const auto space = std::min(comment.find(' '), comment.size());
+    if (line.size() + 1 + space > kMaxColumn && line.size() > indent.size() + 1) {
+      text += line + "\n";
+      line = indent + "#";
+    }
+    line += ' ';
+    line += comment.substr(0, space);
+    comment.remove_prefix(std::min(space + 1, comment.size()));
+  }
+  return text + line + "\n";
+}
 
 }  // namespace
 
@@ -43,7 +61,7 @@ std::string YamlWriter::Format(const std::string& value) {
 void YamlWriter::BeginSection(const std::string& name, const std::string& comment, int depth) {
   if (depth == 0 && !text_.empty()) text_ += '\n';
   const std::string indent(static_cast<std::size_t>(depth * kIndent), ' ');
-  if (!comment.empty()) fmt::format_to(std::back_inserter(text_), "{}# {}\n", indent, comment);
+  if (!comment.empty()) text_ += FormatComment(comment, indent);
   fmt::format_to(std::back_inserter(text_), "{}{}:\n", indent, name);
 }
 
@@ -58,7 +76,7 @@ void YamlWriter::WriteLine(const std::string& name,
     line.resize(column, ' ');
     line += "# " + comment;
   } else if (!comment.empty()) {
-    fmt::format_to(std::back_inserter(text_), "{}# {}\n", indent, comment);
+    text_ += FormatComment(comment, indent);
   }
   text_ += line + "\n";
 }
