@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <cstdlib>
 #include <random>
 #include <string>
 
@@ -10,27 +10,12 @@
 #include <gtest/gtest.h>
 
 #include "support/temporary_folder.h"
+#include "support/test_images.h"
 
 namespace relocd {
 namespace {
 
 using testing::HasSubstr;
-
-/// A smooth picture, which JPEG keeps well.
-GrayImage MakeImage(int width, int height) {
-  GrayImage image{.width = width, .height = height, .pixels = {}};
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      const double value = 128.0 + 60.0 * std::sin(0.11 * u) + 40.0 * std::cos(0.07 * v);
-      image.pixels.push_back(static_cast<std::uint8_t>(value));
-    }
-  }
-  return image;
-}
-
-std::vector<std::uint8_t> MakeJpeg(int width, int height, int quality = 90) {
-  return EncodeGrayToJpeg(MakeImage(width, height), quality).value();
-}
 
 int WorstDifference(const GrayImage& a, const GrayImage& b) {
   int worst = 0;
@@ -42,7 +27,7 @@ int WorstDifference(const GrayImage& a, const GrayImage& b) {
 
 TEST(JpegTest, DecodingUndoesEncodingForAnySize) {
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {16, 16}, {97, 61}, {640, 480}}) {
-    const GrayImage image = MakeImage(width, height);
+    const GrayImage image = MakeTestImage(width, height);
     const auto jpeg = EncodeGrayToJpeg(image, 95);
     ASSERT_TRUE(jpeg) << jpeg.error().message;
     EXPECT_TRUE(FindWholeJpeg(*jpeg));
@@ -55,7 +40,7 @@ TEST(JpegTest, DecodingUndoesEncodingForAnySize) {
 }
 
 TEST(JpegTest, YuyvKeepsItsBrightness) {
-  const GrayImage image = MakeImage(98, 41);
+  const GrayImage image = MakeTestImage(98, 41);
   const int bytes_per_line = 2 * image.width + 12;  // drivers pad their lines
   std::vector<std::uint8_t> yuyv(static_cast<std::size_t>(bytes_per_line * image.height), 128);
   for (int v = 0; v < image.height; ++v) {
@@ -73,11 +58,11 @@ TEST(JpegTest, YuyvKeepsItsBrightness) {
 }
 
 TEST(JpegTest, LowerQualityIsSmaller) {
-  EXPECT_LT(MakeJpeg(320, 240, 20).size(), MakeJpeg(320, 240, 95).size());
+  EXPECT_LT(MakeTestJpeg(320, 240, 20).size(), MakeTestJpeg(320, 240, 95).size());
 }
 
 TEST(JpegTest, RefusesWhatCannotBeEncoded) {
-  EXPECT_EQ(EncodeGrayToJpeg(MakeImage(8, 8), 0).error().message,
+  EXPECT_EQ(EncodeGrayToJpeg(MakeTestImage(8, 8), 0).error().message,
             "encoding JPEG: the quality is 0, must be in [1, 100]");
   EXPECT_EQ(EncodeGrayToJpeg({.width = 8, .height = 8, .pixels = {1, 2}}, 80).error().message,
             "encoding JPEG: 2 pixels for 8 x 8 px");
@@ -93,7 +78,7 @@ TEST(JpegTest, RefusesWhatCannotBeEncoded) {
 }
 
 TEST(JpegTest, FindsTheJpegInAPaddedBuffer) {
-  const auto jpeg = MakeJpeg(32, 24);
+  const auto jpeg = MakeTestJpeg(32, 24);
   auto padded = jpeg;
   padded.resize(padded.size() + 1000);
   const auto found = FindWholeJpeg(padded);
@@ -102,7 +87,7 @@ TEST(JpegTest, FindsTheJpegInAPaddedBuffer) {
 }
 
 TEST(JpegTest, AJpegWithoutStartOrEndIsNotWhole) {
-  const auto jpeg = MakeJpeg(32, 24);
+  const auto jpeg = MakeTestJpeg(32, 24);
   EXPECT_FALSE(FindWholeJpeg(std::span(jpeg).subspan(1)));
   EXPECT_FALSE(FindWholeJpeg(std::span(jpeg).first(jpeg.size() - 1)));
   EXPECT_FALSE(FindWholeJpeg(std::span(jpeg).first(2)));
@@ -120,14 +105,14 @@ TEST(JpegTest, RefusesBytesThatAreNoJpeg) {
 }
 
 TEST(JpegTest, RefusesAJpegThatWasCutShort) {
-  const auto jpeg = MakeJpeg(320, 240);
+  const auto jpeg = MakeTestJpeg(320, 240);
   const auto decoded = DecodeJpegToGray(std::span(jpeg).first(jpeg.size() / 2));
   ASSERT_FALSE(decoded);
   EXPECT_THAT(decoded.error().message, HasSubstr("320 x 240 px are damaged (Premature end"));
 }
 
 TEST(JpegTest, RefusesASizeAboveTheLimitBeforeAllocating) {
-  auto jpeg = MakeJpeg(32, 24);
+  auto jpeg = MakeTestJpeg(32, 24);
   const std::array<std::uint8_t, 2> frame_marker{0xFF, 0xC0};
   const auto frame = std::ranges::search(jpeg, frame_marker).begin();
   ASSERT_NE(frame, jpeg.end());
@@ -138,7 +123,7 @@ TEST(JpegTest, RefusesASizeAboveTheLimitBeforeAllocating) {
 }
 
 TEST(JpegTest, DecodesMotionJpegWithoutHuffmanTables) {
-  auto jpeg = MakeJpeg(64, 48);
+  auto jpeg = MakeTestJpeg(64, 48);
   const auto whole = DecodeJpegToGray(jpeg);
   const std::array<std::uint8_t, 2> table_marker{0xFF, 0xC4};
   int removed = 0;
@@ -155,7 +140,7 @@ TEST(JpegTest, DecodesMotionJpegWithoutHuffmanTables) {
 }
 
 TEST(JpegTest, SurvivesMutatedBytes) {
-  const auto original = MakeJpeg(64, 48);
+  const auto original = MakeTestJpeg(64, 48);
   std::mt19937 engine(5);  // the same mutations in every run
   std::uniform_int_distribution<int> byte(0, 255);
   int decoded = 0;
