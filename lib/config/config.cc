@@ -88,6 +88,7 @@ Result<void> Config::Validate() const {
     if (auto ok = check("cameras." + name, camera); !ok) return ok;
   }
   if (auto ok = check("can", can); !ok) return ok;
+  if (auto ok = check("odometry", odometry); !ok) return ok;
   if (auto ok = check("recorder", recorder); !ok) return ok;
   return check("supervisor", supervisor);
 }

@@ -7,6 +7,7 @@
 #include "camera/camera_config.h"
 #include "can/can_config.h"
 #include "core/result.h"
+#include "odometry/wheel_odometry.h"
 #include "recording/recorder_config.h"
 #include "supervision/process_spec.h"
 
@@ -31,6 +32,7 @@ struct Config {
   BusConfig bus;
   std::map<std::string, CameraConfig> cameras{{"front", CameraConfig()}};
   CanConfig can;
+  OdometryConfig odometry;
   RecorderConfig recorder;
   SupervisionConfig supervisor;
 
@@ -41,6 +43,7 @@ struct Config {
           self.cameras,
           "camerad: one for each camera, by a name of letters, digits and _.");
     visit("can", self.can, "odometryd: where the vehicle's CAN frames come from.");
+    visit("odometry", self.odometry, "odometryd: how the wheels move the body.");
     visit("recorder", self.recorder, "recorderd: what is kept of the messages.");
     visit("supervisor", self.supervisor, "relocd: the daemons it starts and watches.");
   }
