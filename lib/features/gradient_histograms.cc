@@ -75,6 +75,7 @@ GradientHistogramsConfig GradientHistogramsForImage(int width, int height) {
 Result<std::unique_ptr<GradientHistograms>> GradientHistograms::Create(
     const GradientHistogramsConfig& config) {
   if (auto valid = Validate(config); !valid) return std::move(valid).error();
+  cv::setNumThreads(1);  // resizing takes less than waking OpenCV's pool, and callers have threads
   return std::unique_ptr<GradientHistograms>(new GradientHistograms(config));
 }
 

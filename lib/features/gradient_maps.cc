@@ -143,6 +143,28 @@ RELOCD_VECTORISED void HalveRow(const float* upper, const float* lower, int widt
   }
 }
 
+/// sum(roots * sqrt(histogram)) / sqrt(sum(histogram)).
+RELOCD_VECTORISED float RootProduct(const float* roots, const float* histogram) {
+  constexpr float kTiny = 1e-6F;
+  Bins products = {};
+  Bins sums = {};
+  for (int i = 0; i < GradientMaps::kDescriptorSize; i += kBins) {
+    Bins square_roots;
+    for (int bin = 0; bin < kBins; ++bin) {
+      square_roots[bin] = std::sqrt(histogram[i + bin]);
+    }
+    products += *reinterpret_cast<const Bins*>(roots + i) * square_roots;
+    sums += *reinterpret_cast<const Bins*>(histogram + i);
+  }
+  float product = 0.0F;
+  float sum = kTiny;
+  for (int bin = 0; bin < kBins; ++bin) {
+    product += products[bin];
+    sum += sums[bin];
+  }
+  return product / std::sqrt(sum);
+}
+
 /// Coarse octaves keep every pixel, so that a cell's place in them is near enough.
 int StepOfOctave(int octave) {
   return octave < 3 ? 2 : 1;
@@ -275,6 +297,15 @@ void GradientMaps::Sample(int octave, float x, float y, std::span<float> histogr
                 kBins,
                 histogram.begin() + static_cast<std::ptrdiff_t>(point * kBins));
   }
+}
+
+float GradientMaps::Affinity(int octave,
+                             float x,
+                             float y,
+                             std::span<const float> reference_roots) const {
+  std::array<float, kDescriptorSize> histogram;
+  Sample(octave, x, y, histogram);
+  return RootProduct(reference_roots.data(), histogram.data());
 }
 
 float GradientMaps::Texture(int octave, float x, float y) const {

@@ -40,6 +40,16 @@ class GradientMaps {
   /// @param histogram  kDescriptorSize values.
   void Sample(int octave, float x, float y, std::span<float> histogram) const;
 
+  /// How alike the histograms around a place are to `reference`: the sum of
+  /// sqrt(reference) * sqrt(histogram), where both are first divided by their sums: 1 for equal
+  /// ones (Bhattacharyya's coefficient).
+  ///
+  /// @param reference_roots  kDescriptorSize square roots of a histogram of sum 1.
+  [[nodiscard]] float Affinity(int octave,
+                               float x,
+                               float y,
+                               std::span<const float> reference_roots) const;
+
   /// The mean gradient magnitude near a place: how much texture there is.
   [[nodiscard]] float Texture(int octave, float x, float y) const;
 

@@ -6,17 +6,15 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
 #include "core/check.h"
 #include "core/file.h"
+#include "core/sha256.h"
 #include "features/gradient_histograms.h"
 #include "scene_coordinates/map_archive.h"
 
 namespace relocd {
 namespace {
-
-using Digest = std::array<unsigned char, 32>;
 
 constexpr std::string_view kMagic = "RELOCMAP";
 constexpr std::uint32_t kMaxRegions = 1024;
@@ -33,26 +31,9 @@ struct Header {
   std::uint32_t version = 0;
   std::uint32_t reserved = 0;
   std::uint64_t content_size = 0;
-  Digest sha256{};
+  std::array<char, 64> sha256{};  ///< In hexadecimal.
 };
-static_assert(sizeof(Header) == 56);
-
-Digest Sha256(std::string_view bytes) {
-  Digest digest{};
-  unsigned size = 0;
-  const int done =
-      EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr);
-  RELOCD_CHECK(done == 1 && size == digest.size(), "sha256 failed");
-  return digest;
-}
-
-std::string Hexadecimal(const Digest& digest) {
-  std::string text;
-  for (const unsigned char byte : digest) {
-    text += fmt::format("{:02x}", byte);
-  }
-  return text;
-}
+static_assert(sizeof(Header) == 88);
 
 /// For messages: what is not printable ASCII as dots.
 std::string Printable(std::string_view bytes) {
@@ -238,7 +219,8 @@ std::string SerializeMap(const SceneMap& map) {
   std::copy(kMagic.begin(), kMagic.end(), header.magic.begin());
   header.version = kMapFormatVersion;
   header.content_size = content.size();
-  header.sha256 = Sha256(content);
+  const std::string digest = Sha256Hex(content);
+  std::copy(digest.begin(), digest.end(), header.sha256.begin());
   std::string bytes(sizeof(header), '\0');
   std::memcpy(bytes.data(), &header, sizeof(header));
   return bytes + content;
@@ -275,12 +257,13 @@ Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
                                header.content_size,
                                content.size() < header.content_size ? "truncated" : "too long"));
   }
-  const Digest digest = Sha256(content);
-  if (digest != header.sha256) {
+  const std::string digest = Sha256Hex(content);
+  const std::string_view expected(header.sha256.data(), header.sha256.size());
+  if (digest != expected) {
     return Refusal(name,
                    fmt::format("sha256 of the content is {}, must be {}: it is damaged",
-                               Hexadecimal(digest),
-                               Hexadecimal(header.sha256)));
+                               digest,
+                               Printable(expected)));
   }
   SceneMap map;
   MapReader reader(content);
@@ -292,7 +275,7 @@ Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
   if (auto consistent = CheckConsistency(map); !consistent) {
     return std::move(consistent).error().WithContext(name);
   }
-  map.id = Hexadecimal(digest);
+  map.id = digest;
   return map;
 }
 

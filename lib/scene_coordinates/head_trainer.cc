@@ -1,0 +1,408 @@
+#include "scene_coordinates/head_trainer.h"
+
+#include <algorithm>
+#include <barrier>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <numeric>
+#include <random>
+#include <thread>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <omp.h>
+#include <oneapi/dnnl/dnnl.hpp>
+
+#include "core/check.h"
+#include "scene_coordinates/scene_loss.h"
+#include "scene_coordinates/shard_network.h"
+
+#define RELOCD_VECTORISED __attribute__((target_clones("default", "arch=x86-64-v3")))
+
+namespace relocd {
+namespace {
+
+constexpr int kReportEvery = 50;
+
+/// Factors of AdamW (Loshchilov and Hutter, "Decoupled weight decay regularization", 2019) for one
+/// step.
+struct AdamStep {
+  float gradient_scale = 0.0F;  ///< From the sum over the batch to its mean.
+  float rate = 0.0F;
+  float decay = 0.0F;
+  float momentum_correction = 0.0F;
+  float variance_correction = 0.0F;
+};
+constexpr float kMomentum = 0.9F;
+constexpr float kVarianceMomentum = 0.999F;
+constexpr float kAdamEpsilon = 1e-8F;
+
+/// One range of parameters and all that belongs to it.
+struct AdamRange {
+  std::size_t size = 0;
+  float* parameters = nullptr;
+  float* momentum = nullptr;
+  float* variance = nullptr;
+  const float* gradients = nullptr;  ///< Of the first shard; the others follow at a stride.
+  std::size_t shard_stride = 0;
+};
+
+RELOCD_VECTORISED void UpdateParameters(const AdamStep& step, const AdamRange& range) {
+  static_assert(kTrainerShards == 4);
+  const std::size_t stride = range.shard_stride;
+  for (std::size_t i = 0; i < range.size; ++i) {
+    const float* gradients = range.gradients + i;
+    const float gradient = step.gradient_scale * ((gradients[0] + gradients[stride]) +
+                                                  (gradients[2 * stride] + gradients[3 * stride]));
+    range.momentum[i] = kMomentum * range.momentum[i] + (1.0F - kMomentum) * gradient;
+    range.variance[i] =
+        kVarianceMomentum * range.variance[i] + (1.0F - kVarianceMomentum) * gradient * gradient;
+    const float deviation = std::sqrt(range.variance[i] * step.variance_correction) + kAdamEpsilon;
+    range.parameters[i] -= step.rate * range.momentum[i] * step.momentum_correction / deviation +
+                           step.decay * range.parameters[i];
+  }
+}
+
+RELOCD_VECTORISED void Narrow(const float* in, std::size_t size, Bfloat16* out) {
+  for (std::size_t i = 0; i < size; ++i) {
+    out[i] = ToBfloat16(in[i]);
+  }
+}
+void Narrow(const float* in, std::size_t size, float* out) {
+  std::copy_n(in, size, out);
+}
+
+/// The learning rate's one cycle: up along a line, down along a cosine.
+double LearningRate(const HeadTrainerConfig& config, int iteration) {
+  constexpr double kFirst = 0.04;
+  constexpr double kLast = 0.002;
+  const double progress = static_cast<double>(iteration) / config.iterations;
+  if (progress < config.warm_up) {
+    return config.learning_rate * (kFirst + (1.0 - kFirst) * progress / config.warm_up);
+  }
+  const double down = (progress - config.warm_up) / (1.0 - config.warm_up);
+  return config.learning_rate *
+         (kLast + (1.0 - kLast) * 0.5 * (1.0 + std::cos(std::numbers::pi * down)));
+}
+
+/// Wide for most of the training, then closing fast: a quarter of an ellipse.
+double Tolerance(const HeadTrainerConfig& config, int iteration) {
+  const double progress = static_cast<double>(iteration) / config.iterations;
+  return config.final_tolerance_px + (config.initial_tolerance_px - config.final_tolerance_px) *
+                                         std::sqrt(1.0 - progress * progress);
+}
+
+/// The loss of one shard's cells, and what it adds up to.
+class ShardLoss final : public OutputLoss {
+ public:
+  ShardLoss(const TrainingSet& set, const std::vector<LossCamera>& cameras)
+      : set_(set), cameras_(cameras) {}
+
+  void Begin(const SceneLossConfig& config, std::span<const std::uint32_t> cells) {
+    config_ = config;
+    cells_ = cells;
+    loss_ = 0.0;
+    errors_px_.clear();
+  }
+
+  void Evaluate(std::span<const float> outputs, std::span<float> gradients) override {
+    for (std::size_t row = 0; row < cells_.size(); ++row) {
+      const TrainingTarget& target = set_.targets[cells_[row]];
+      const std::span<const float, kHeadOutputs> output(outputs.data() + row * kHeadOutputs,
+                                                        kHeadOutputs);
+      const SceneLoss loss = EvaluateSceneLoss(config_, cameras_[target.image], target, output);
+      std::copy(loss.gradient.begin(),
+                loss.gradient.end(),
+                gradients.begin() + static_cast<std::ptrdiff_t>(row * kHeadOutputs));
+      loss_ += loss.loss;
+      if (loss.valid) errors_px_.push_back(loss.error_px);
+    }
+  }
+
+  [[nodiscard]] double loss() const { return loss_; }
+  [[nodiscard]] const std::vector<float>& errors_px() const { return errors_px_; }
+
+ private:
+  const TrainingSet& set_;
+  const std::vector<LossCamera>& cameras_;
+  SceneLossConfig config_;
+  std::span<const std::uint32_t> cells_;
+  double loss_ = 0.0;
+  std::vector<float> errors_px_;
+};
+
+/// One training: state that all threads share, and what each thread does in turn.
+template <typename Number>
+class Trainer {
+ public:
+  Trainer(const TrainingSet& set,
+          const HeadTrainerConfig& config,
+          const std::function<void(const TrainingProgress&)>& progress);
+
+  Head Run();
+
+ private:
+  void RunThread(std::size_t thread, std::barrier<>& barrier);
+  void RunShard(std::size_t thread, std::size_t shard);
+  void UpdateRange(std::size_t thread);
+  /// By one thread, between the steps of all.
+  void Advance();
+  void Report();
+  void BeginStep();
+
+  const TrainingSet& set_;
+  const HeadTrainerConfig& config_;
+  const std::function<void(const TrainingProgress&)>& progress_;
+  std::mt19937_64 engine_;
+  Head head_;
+  ParameterLayout layout_;
+  std::vector<float> parameters_;
+  std::vector<Number> narrow_parameters_;
+  std::vector<float> momentum_;
+  std::vector<float> variance_;
+  std::vector<float> gradients_;  ///< kTrainerShards x layout_.size()
+  std::vector<LossCamera> cameras_;
+  std::vector<std::unique_ptr<ShardNetwork<Number>>> networks_;  ///< One a thread.
+  std::vector<std::unique_ptr<ShardLoss>> losses_;               ///< One a shard.
+  std::vector<std::uint32_t> order_;
+  std::size_t next_in_order_ = 0;
+  int iteration_ = 0;
+  double loss_since_report_ = 0.0;
+  AdamStep adam_;
+  SceneLossConfig loss_config_;
+};
+
+/// Where the scene is, roughly: half of it around the cameras.
+void PlaceHead(const TrainingSet& set, Head& head) {
+  for (const Pose3& X_WC : set.X_WCs) {
+    head.centre_W += X_WC.translation() / static_cast<double>(set.X_WCs.size());
+  }
+  double squares = 0.0;
+  for (const Pose3& X_WC : set.X_WCs) {
+    squares += (X_WC.translation() - head.centre_W).squaredNorm();
+  }
+  head.scale_m = std::sqrt(squares / static_cast<double>(set.X_WCs.size())) + set.typical_depth_m;
+}
+
+template <typename Number>
+Trainer<Number>::Trainer(const TrainingSet& set,
+                         const HeadTrainerConfig& config,
+                         const std::function<void(const TrainingProgress&)>& progress)
+    : set_(set),
+      config_(config),
+      progress_(progress),
+      engine_(config.seed),
+      head_(MakeRandomHead(config.shape, engine_())),
+      layout_(config.shape),
+      parameters_(FlattenHead(head_, layout_)),
+      narrow_parameters_(layout_.size()),
+      momentum_(layout_.size()),
+      variance_(layout_.size()),
+      gradients_(kTrainerShards * layout_.size()),
+      order_(set.targets.size()) {
+  Narrow(parameters_.data(), parameters_.size(), narrow_parameters_.data());
+  PlaceHead(set, head_);
+  for (const Pose3& X_WC : set.X_WCs) {
+    cameras_.push_back(MakeLossCamera(X_WC, head_.centre_W));
+  }
+  const auto shard_rows = static_cast<std::size_t>(config.batch / kTrainerShards);
+  const int threads = std::min(config.threads, kTrainerShards);
+  for (int thread = 0; thread < threads; ++thread) {
+    networks_.push_back(std::make_unique<ShardNetwork<Number>>(
+        layout_, shard_rows, parameters_.data(), narrow_parameters_.data()));
+  }
+  for (int shard = 0; shard < kTrainerShards; ++shard) {
+    losses_.push_back(std::make_unique<ShardLoss>(set, cameras_));
+  }
+  std::iota(order_.begin(), order_.end(), 0U);
+  next_in_order_ = order_.size();
+}
+
+template <typename Number>
+Head Trainer<Number>::Run() {
+  std::barrier<> barrier(std::ssize(networks_));
+  BeginStep();
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t thread = 1; thread < networks_.size(); ++thread) {
+      threads.emplace_back([this, thread, &barrier] { RunThread(thread, barrier); });
+    }
+    RunThread(0, barrier);
+  }
+  UnflattenHead(layout_, parameters_, head_);
+  return std::move(head_);
+}
+
+template <typename Number>
+void Trainer<Number>::RunThread(std::size_t thread, std::barrier<>& barrier) {
+  omp_set_num_threads(1);  // of this thread: oneDNN is not to start more
+  while (iteration_ < config_.iterations) {
+    for (std::size_t shard = thread; shard < kTrainerShards; shard += networks_.size()) {
+      RunShard(thread, shard);
+    }
+    barrier.arrive_and_wait();
+    UpdateRange(thread);
+    barrier.arrive_and_wait();
+    if (thread == 0) Advance();
+    barrier.arrive_and_wait();
+  }
+}
+
+template <typename Number>
+void Trainer<Number>::RunShard(std::size_t thread, std::size_t shard) {
+  const auto rows = static_cast<std::size_t>(config_.batch / kTrainerShards);
+  const auto cells = std::span(order_).subspan(next_in_order_ + shard * rows, rows);
+  ShardNetwork<Number>& network = *networks_[thread];
+  const auto dimension = static_cast<std::size_t>(set_.dimension);
+  for (std::size_t row = 0; row < rows; ++row) {
+    const Bfloat16* features = set_.features.data() + cells[row] * dimension;
+    if constexpr (std::is_same_v<Number, Bfloat16>) {
+      std::copy_n(features, dimension, network.InputRow(row).begin());
+    } else {
+      std::transform(
+          features, features + dimension, network.InputRow(row).begin(), [](Bfloat16 value) {
+            return ToFloat(value);
+          });
+    }
+  }
+  losses_[shard]->Begin(loss_config_, cells);
+  network.Run(*losses_[shard],
+              std::span(gradients_).subspan(shard * layout_.size(), layout_.size()));
+}
+
+template <typename Number>
+void Trainer<Number>::UpdateRange(std::size_t thread) {
+  const std::size_t begin = layout_.size() * thread / networks_.size();
+  const std::size_t end = layout_.size() * (thread + 1) / networks_.size();
+  UpdateParameters(adam_,
+                   {end - begin,
+                    parameters_.data() + begin,
+                    momentum_.data() + begin,
+                    variance_.data() + begin,
+                    gradients_.data() + begin,
+                    layout_.size()});
+  Narrow(parameters_.data() + begin, end - begin, narrow_parameters_.data() + begin);
+}
+
+template <typename Number>
+void Trainer<Number>::Advance() {
+  next_in_order_ += static_cast<std::size_t>(config_.batch);
+  ++iteration_;
+  for (const auto& loss : losses_) {
+    loss_since_report_ += loss->loss();
+  }
+  if (iteration_ % kReportEvery == 0 || iteration_ == config_.iterations) Report();
+  if (iteration_ < config_.iterations) BeginStep();
+}
+
+template <typename Number>
+void Trainer<Number>::Report() {
+  std::vector<float> errors_px;
+  for (const auto& loss : losses_) {
+    errors_px.insert(errors_px.end(), loss->errors_px().begin(), loss->errors_px().end());
+  }
+  TrainingProgress report;
+  report.iteration = iteration_;
+  report.iterations = config_.iterations;
+  const int since = (iteration_ - 1) % kReportEvery + 1;
+  report.loss = loss_since_report_ / (static_cast<double>(since) * config_.batch);
+  report.valid = static_cast<double>(errors_px.size()) / config_.batch;
+  if (!errors_px.empty()) {
+    const auto middle = errors_px.begin() + std::ssize(errors_px) / 2;
+    std::nth_element(errors_px.begin(), middle, errors_px.end());
+    report.median_error_px = *middle;
+  }
+  loss_since_report_ = 0.0;
+  if (progress_) progress_(report);
+}
+
+template <typename Number>
+void Trainer<Number>::BeginStep() {
+  if (next_in_order_ + static_cast<std::size_t>(config_.batch) > order_.size()) {
+    std::shuffle(order_.begin(), order_.end(), engine_);
+    next_in_order_ = 0;
+  }
+  const double rate = LearningRate(config_, iteration_);
+  adam_.gradient_scale = 1.0F / static_cast<float>(config_.batch);
+  adam_.rate = static_cast<float>(rate);
+  adam_.decay = static_cast<float>(rate * config_.weight_decay);
+  adam_.momentum_correction = static_cast<float>(1.0 / (1.0 - std::pow(kMomentum, iteration_ + 1)));
+  adam_.variance_correction =
+      static_cast<float>(1.0 / (1.0 - std::pow(kVarianceMomentum, iteration_ + 1)));
+  loss_config_ = {.focal_px = static_cast<float>(set_.focal_px),
+                  .tolerance_px = static_cast<float>(Tolerance(config_, iteration_)),
+                  .depth_baseline_m = static_cast<float>(config_.depth_baseline_m),
+                  .depth_weight = static_cast<float>(config_.depth_weight),
+                  .typical_depth_m = static_cast<float>(set_.typical_depth_m),
+                  .confident_px = static_cast<float>(config_.confident_px),
+                  .centre_W = Eigen::Vector3f::Zero(),
+                  .scale_m = static_cast<float>(head_.scale_m)};
+}
+
+Result<void> CheckSet(const TrainingSet& set, const HeadTrainerConfig& config) {
+  if (set.dimension != config.shape.inputs) {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format(
+            "head.inputs is {}, must be {} as the features'", config.shape.inputs, set.dimension)};
+  }
+  if (set.targets.size() < static_cast<std::size_t>(config.batch)) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("there are {} training cells, must be at least a batch of {}",
+                             set.targets.size(),
+                             config.batch)};
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> HeadTrainerConfig::Validate() const {
+  if (auto valid = shape.Validate(); !valid) return valid;
+  using Rule = std::tuple<const char*, double, double, double>;
+  for (const auto& [field, value, low, high] :
+       {Rule{"iterations", iterations, 1, 1e7},
+        Rule{"batch", batch, kTrainerShards, 1 << 20},
+        Rule{"learning_rate", learning_rate, 1e-8, 1.0},
+        Rule{"warm_up", warm_up, 1e-6, 0.999},
+        Rule{"weight_decay", weight_decay, 0.0, 1.0},
+        Rule{"initial_tolerance_px", initial_tolerance_px, 1e-3, 1e4},
+        Rule{"final_tolerance_px", final_tolerance_px, 1e-3, initial_tolerance_px},
+        Rule{"depth_baseline_m", depth_baseline_m, 0.0, 1e3},
+        Rule{"depth_weight", depth_weight, 0.0, 1e3},
+        Rule{"confident_px", confident_px, 1e-3, 1e4},
+        Rule{"threads", threads, 1, 256}}) {
+    if (!(value >= low && value <= high)) {
+      return Error{ErrorKind::kInvalidInput,
+                   fmt::format("training.{} is {}, must be in [{}, {}]", field, value, low, high)};
+    }
+  }
+  if (batch % kTrainerShards != 0) {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format("training.batch is {}, must be a multiple of {}", batch, kTrainerShards)};
+  }
+  return {};
+}
+
+Result<Head> TrainHead(const TrainingSet& set,
+                       const HeadTrainerConfig& config,
+                       const std::function<void(const TrainingProgress&)>& progress) {
+  if (auto valid = config.Validate(); !valid) return std::move(valid).error();
+  if (auto valid = CheckSet(set, config); !valid) return std::move(valid).error();
+  const Precision precision =
+      config.precision == Precision::kFastest ? FastestPrecision() : config.precision;
+  try {
+    omp_set_num_threads(1);  // products are made for one thread each
+    if (precision == Precision::kBfloat16) return Trainer<Bfloat16>(set, config, progress).Run();
+    return Trainer<float>(set, config, progress).Run();
+  } catch (const dnnl::error& error) {
+    return Error{ErrorKind::kInternal, fmt::format("training a head: {}", error.what())};
+  }
+}
+
+}  // namespace relocd

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "camera/dataset.h"
+#include "camera/pinhole_camera.h"
+#include "core/result.h"
+#include "geometry/pose3.h"
+#include "relocalization/camera_pose_estimator.h"
+#include "scene_coordinates/map_file.h"
+#include "scene_coordinates/scene_coordinate_predictor.h"
+
+namespace relocd {
+
+/// The pose options that a region's calibration asks for.
+CameraPoseOptions PoseOptionsFor(const RegionCalibration& calibration);
+
+/// What came out for one frame.
+struct FrameLocalization {
+  DatasetFrame frame;     ///< In the data set's world.
+  CameraPoseResult pose;  ///< In W.
+  std::size_t region = 0;
+  double milliseconds = 0.0;  ///< From the JPEG's bytes to the pose.
+};
+
+/// Finds the camera of each frame by itself, without knowing where the one before was: all regions
+/// are tried, and the pose with the most support is kept.
+///
+/// @param calibrations  one a region, in place of the map's, or empty.
+Result<std::vector<FrameLocalization>> LocalizeFrames(
+    const SceneMap& map,
+    const std::vector<DatasetFrame>& frames,
+    const std::vector<RegionCalibration>& calibrations,
+    int threads);
+
+/// Errors against the data set's poses.
+struct PoseErrors {
+  std::size_t frames = 0;
+  std::size_t localized = 0;
+  double median_m = 0.0;  ///< Of the localized frames, as the next two.
+  double p95_m = 0.0;
+  double median_rad = 0.0;
+  double within_1m = 0.0;  ///< Share of all frames.
+  double within_95 =
+      0.0;  ///< Share of localized frames inside the 95 % region of their covariance.
+  double median_ms = 0.0;
+  double p99_ms = 0.0;
+};
+
+PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalization>& localizations);
+
+/// The error of a pose, as its covariance sees it: X_WC_true = X_WC * Exp(error).
+Vector6d PoseError(const SceneMap& map, const FrameLocalization& localization);
+
+/// In [0, 1]; `values` must not be empty.
+double Quantile(std::vector<double> values, double share);
+
+}  // namespace relocd

@@ -1,0 +1,252 @@
+#include "map_training.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "camera/jpeg.h"
+#include "camera/pinhole_camera.h"
+#include "geometry/covariance.h"
+#include "progress_line.h"
+
+namespace relocd {
+namespace {
+
+constexpr std::size_t kMinFrames = 8;
+/// A head has this many numbers to learn; more steps than for a full region would gain nothing.
+constexpr double kMinRouteM = 0.5;
+
+Error Invalid(std::string message) {
+  return {ErrorKind::kInvalidInput, std::move(message)};
+}
+
+/// Frames of one stretch of the route.
+struct RegionFrames {
+  std::vector<DatasetFrame> training;
+  std::vector<DatasetFrame> held_out;
+};
+
+/// Path length up to each frame.
+std::vector<double> TravelledMetres(const std::vector<DatasetFrame>& frames) {
+  std::vector<double> travelled = {0.0};
+  for (std::size_t index = 1; index < frames.size(); ++index) {
+    const Eigen::Vector3d step =
+        frames[index].X_WC.translation() - frames[index - 1].X_WC.translation();
+    travelled.push_back(travelled.back() + step.norm());
+  }
+  return travelled;
+}
+
+/// Divides the route into stretches of equal length with an overlap, and each one's frames into
+/// those that train and those that measure.
+std::vector<RegionFrames> DivideRoute(const std::vector<DatasetFrame>& frames,
+                                      const MapTrainingOptions& options) {
+  const std::vector<double> travelled = TravelledMetres(frames);
+  const double length = travelled.back();
+  const auto count = static_cast<std::size_t>(
+      std::max(1.0, std::ceil((length - options.region_overlap_m) / options.region_length_m)));
+  const double stretch = length / static_cast<double>(count);
+  std::vector<RegionFrames> regions(count);
+  for (std::size_t region = 0; region < count; ++region) {
+    const double begin = static_cast<double>(region) * stretch - 0.5 * options.region_overlap_m;
+    const double end = static_cast<double>(region + 1) * stretch + 0.5 * options.region_overlap_m;
+    for (std::size_t index = 0; index < frames.size(); ++index) {
+      if (travelled[index] < begin || travelled[index] > end) continue;
+      // The same frames in every region that has them, so that none is trained here and measured
+      // there.
+      const auto every = static_cast<std::size_t>(options.held_out_every);
+      const bool is_held_out = index % every == every / 2;
+      (is_held_out ? regions[region].held_out : regions[region].training).push_back(frames[index]);
+    }
+  }
+  return regions;
+}
+
+Result<std::vector<TrainingImage>> LoadImages(const std::vector<DatasetFrame>& frames,
+                                              const CameraIntrinsics& camera,
+                                              const Pose3& X_WD) {
+  std::vector<TrainingImage> images;
+  for (const DatasetFrame& frame : frames) {
+    auto image = ReadGrayImage(frame.image_path);
+    if (!image) return std::move(image).error();
+    if (image->width != camera.width || image->height != camera.height) {
+      return Invalid(
+          fmt::format("{}: image is {} x {} pixels, must be {} x {} as intrinsics.txt says",
+                      frame.image_path,
+                      image->width,
+                      image->height,
+                      camera.width,
+                      camera.height));
+    }
+    images.push_back({std::move(*image), X_WD * frame.X_WC});
+  }
+  return images;
+}
+
+std::vector<TrainingPose> CoarsePoses(const std::vector<TrainingImage>& images) {
+  std::vector<TrainingPose> poses;
+  for (const TrainingImage& image : images) {
+    const Eigen::Vector3d forward_W = image.X_WC.R().col(2);
+    poses.push_back({image.X_WC.translation().cast<float>(),
+                     static_cast<float>(std::atan2(forward_W.y(), forward_W.x()))});
+  }
+  return poses;
+}
+
+/// As the file will have them, so that what is measured is what is stored.
+void RoundAsStored(std::vector<float>& values) {
+  std::transform(values.begin(), values.end(), values.begin(), RoundToHalf);
+}
+
+/// The region's head, and the whitening that goes with it.
+Result<MapRegion> TrainRegion(const std::vector<TrainingImage>& images,
+                              const std::string& name,
+                              const MapTrainingOptions& options,
+                              SceneMap& map) {
+  const PinholeCamera camera(map.camera);
+  TrainingSetConfig cells = options.cells;
+  cells.seed = options.seed;
+  cells.threads = options.threads;
+  Result<PreparedTraining> prepared = [&] {
+    ProgressLine line(name + ": features and depths");
+    return PrepareTraining(
+        images, camera, map.features, cells, [&](double done) { line.Show(done, ""); });
+  }();
+  if (!prepared) return std::move(prepared).error();
+  map.whitening = std::move(prepared->whitening);
+  RoundAsStored(map.whitening.mean);
+  RoundAsStored(map.whitening.basis);
+
+  HeadTrainerConfig config = options.head;
+  config.seed = options.seed;
+  config.threads = options.threads;
+  config.shape.inputs = prepared->set.dimension;
+  ProgressLine line(name + ": training");
+  auto head = TrainHead(prepared->set, config, [&](const TrainingProgress& progress) {
+    line.Show(static_cast<double>(progress.iteration) / progress.iterations,
+              fmt::format("loss {:.2f}, error {:.1f} px, valid {:.0f} %",
+                          progress.loss,
+                          progress.median_error_px,
+                          100.0 * progress.valid));
+  });
+  if (!head) return std::move(head).error();
+  for (HeadLayer& layer : head->layers) {
+    RoundAsStored(layer.weights);
+    RoundAsStored(layer.bias);
+  }
+  MapRegion region;
+  region.name = name;
+  region.head = std::move(*head);
+  region.training_poses = CoarsePoses(images);
+  return region;
+}
+
+/// How much the covariances must grow, and from which confidence poses are right, by frames that
+/// the region was not trained on.
+RegionCalibration Calibrate(const SceneMap& map, const std::vector<FrameLocalization>& held_out) {
+  // Errors of neighbouring frames on the same stretch are alike, so that few frames say less than
+  // they seem to: the factor is taken where nine of ten frames are inside their 90 % region.
+  constexpr double kShare = 0.9;
+  constexpr double kChiSquared90Dof6 = 10.644640675668422;
+  constexpr double kThresholdShare = 0.3;
+  constexpr double kRightM = 2.0;
+  RegionCalibration calibration;
+  std::vector<double> ratios;
+  std::vector<double> confidences;
+  for (const FrameLocalization& localization : held_out) {
+    if (localization.pose.status != CameraPoseStatus::kOk) continue;
+    const Vector6d error = PoseError(map, localization);
+    ratios.push_back(SquaredMahalanobis(error, localization.pose.covariance) / kChiSquared90Dof6);
+    if (error.head<3>().norm() < kRightM) confidences.push_back(localization.pose.confidence);
+  }
+  if (ratios.empty() || confidences.empty()) return calibration;
+  calibration.covariance_factor = std::clamp(Quantile(ratios, kShare), 1.0, 1e6);
+  calibration.confidence_threshold = kThresholdShare * Quantile(confidences, 0.05);
+  return calibration;
+}
+
+}  // namespace
+
+Result<void> MapTrainingOptions::Validate() const {
+  if (auto valid = head.Validate(); !valid) return valid;
+  const auto must = [](const char* field, auto value, const char* allowed) {
+    return Invalid(fmt::format("{} is {}, must be {}", field, value, allowed));
+  };
+  if (threads < 1 || threads > 256) return must("--threads", threads, "in [1, 256]");
+  if (held_out_every < 2) return must("--held-out-every", held_out_every, "at least 2");
+  if (!(region_length_m >= 10.0)) return must("--region-length", region_length_m, "at least 10 m");
+  if (cells.views_per_image < 1) return must("--views", cells.views_per_image, "at least 1");
+  return {};
+}
+
+Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOptions& options) {
+  if (auto valid = options.Validate(); !valid) return std::move(valid).error();
+  const auto start = std::chrono::steady_clock::now();
+  const Dataset& dataset = selected.dataset;
+  if (dataset.frames.size() < kMinFrames) {
+    return Invalid(fmt::format("{}: {} training frames, must be at least {}",
+                               dataset.directory,
+                               dataset.frames.size(),
+                               kMinFrames));
+  }
+  if (const double route = TravelledMetres(dataset.frames).back(); route < kMinRouteM) {
+    return Invalid(fmt::format("{}: the camera travels {:.3f} m, must be at least {} m",
+                               dataset.directory,
+                               route,
+                               kMinRouteM));
+  }
+  const auto R_WD = RotationToMap(dataset);
+  if (!R_WD) return R_WD.error();
+
+  TrainedMap trained;
+  SceneMap& map = trained.map;
+  map.camera = dataset.intrinsics;
+  map.R_WD = *R_WD;
+  map.features = GradientHistogramsForImage(map.camera.width, map.camera.height);
+  const std::vector<RegionFrames> regions = DivideRoute(dataset.frames, options);
+  std::vector<DatasetFrame> held_out;
+  for (std::size_t index = 0; index < regions.size(); ++index) {
+    const RegionFrames& frames = regions[index];
+    const auto images =
+        LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
+    if (!images) return images.error();
+    auto region = TrainRegion(*images, fmt::format("region{}", index), options, map);
+    if (!region) return std::move(region).error();
+    map.regions.push_back(std::move(*region));
+    map.training.training_frames += static_cast<std::uint32_t>(frames.training.size());
+    held_out.insert(held_out.end(), frames.held_out.begin(), frames.held_out.end());
+  }
+
+  auto raw = LocalizeFrames(map, held_out, {}, options.threads);
+  if (!raw) return std::move(raw).error();
+  for (std::size_t index = 0; index < map.regions.size(); ++index) {
+    std::vector<FrameLocalization> of_region;
+    std::copy_if(raw->begin(), raw->end(), std::back_inserter(of_region), [&](const auto& result) {
+      return result.region == index;
+    });
+    map.regions[index].calibration = Calibrate(map, of_region);
+  }
+  auto localizations = LocalizeFrames(map, held_out, {}, options.threads);
+  if (!localizations) return std::move(localizations).error();
+  trained.localizations = std::move(*localizations);
+  trained.held_out = MeasureErrors(map, trained.localizations);
+
+  map.training.dataset = selected.name;
+  map.training.program_version = RELOCD_VERSION;
+  map.training.seed = options.seed;
+  map.training.held_out_frames = static_cast<std::uint32_t>(held_out.size());
+  map.training.median_error_m = trained.held_out.median_m;
+  map.training.p95_error_m = trained.held_out.p95_m;
+  map.training.median_error_rad = trained.held_out.median_rad;
+  map.training.within_1m = trained.held_out.within_1m;
+  map.training.training_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return trained;
+}
+
+}  // namespace relocd

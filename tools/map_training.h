@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/result.h"
+#include "map_dataset.h"
+#include "map_evaluation.h"
+#include "scene_coordinates/head_trainer.h"
+#include "scene_coordinates/map_file.h"
+#include "scene_coordinates/training_set.h"
+
+namespace relocd {
+
+/// How a map is made of a data set.
+struct MapTrainingOptions {
+  int threads = 2;
+  std::uint64_t seed = 1;
+  double region_length_m = 150.0;  ///< Longer routes are divided.
+  double region_overlap_m = 20.0;
+  int held_out_every = 8;  ///< Of the training frames; measures the map, never trains it.
+  TrainingSetConfig cells;
+  HeadTrainerConfig head;
+
+  /// @return kInvalidInput, naming the field, its value and what is allowed.
+  [[nodiscard]] Result<void> Validate() const;
+};
+
+/// A finished map, and how it did on the frames held out of its training.
+struct TrainedMap {
+  SceneMap map;
+  PoseErrors held_out;
+  std::vector<FrameLocalization> localizations;
+};
+
+/// Trains a map on the selected frames. Shows progress on stderr if that is a terminal.
+///
+/// @return kInvalidInput when the data cannot make a map: too few frames, images of another size,
+///         poses that do not move, a world whose up axis is not known.
+Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOptions& options);
+
+}  // namespace relocd

@@ -1,0 +1,315 @@
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <iterator>
+#include <numbers>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "core/exit_code.h"
+#include "core/file.h"
+#include "map_dataset.h"
+#include "map_evaluation.h"
+#include "map_training.h"
+#include "scene_coordinates/map_file.h"
+
+// reloc map: makes a map of a recorded drive, finds images in it, and tells what is in it.
+
+namespace relocd {
+namespace {
+
+constexpr double kDegrees = 180.0 / std::numbers::pi;
+
+/// `poses.csv` in the data set's coordinates.
+std::string FormatPoses(const SceneMap& map, const std::vector<FrameLocalization>& localizations) {
+  const Pose3 X_DW = Pose3(map.R_WD, Eigen::Vector3d::Zero()).Inverse();
+  std::string text =
+      "index,time_s,status,tx_m,ty_m,tz_m,qw,qx,qy,qz,inliers,confidence,sigma_t_m,sigma_r_rad,"
+      "region\n";
+  auto out = std::back_inserter(text);
+  for (const FrameLocalization& localization : localizations) {
+    const CameraPoseResult& pose = localization.pose;
+    fmt::format_to(out,
+                   "{},{:.6f},{}",
+                   localization.frame.index,
+                   1e-9 * static_cast<double>(localization.frame.time_ns),
+                   Name(pose.status));
+    if (pose.status != CameraPoseStatus::kOk) {
+      fmt::format_to(out, ",,,,,,,,{},{:.4f},,,\n", pose.inliers, pose.confidence);
+      continue;
+    }
+    const Pose3 X_DC = X_DW * pose.X_WC;
+    const Eigen::Vector3d& t = X_DC.translation();
+    const Eigen::Quaterniond& q = X_DC.rotation();
+    fmt::format_to(out,
+                   ",{:.6f},{:.6f},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{},{:.4f},{:.4f},{:.6f},{}\n",
+                   t.x(),
+                   t.y(),
+                   t.z(),
+                   q.w(),
+                   q.x(),
+                   q.y(),
+                   q.z(),
+                   pose.inliers,
+                   pose.confidence,
+                   std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace()),
+                   std::sqrt(pose.covariance.bottomRightCorner<3, 3>().trace()),
+                   map.regions[localization.region].name);
+  }
+  return text;
+}
+
+std::string FormatErrors(const PoseErrors& errors) {
+  return fmt::format(
+      "localized {} of {} frames: median {:.3f} m, {:.3f} deg; p95 {:.3f} m; within 1 m {:.1f} %; "
+      "inside the reported 95 % region {:.0f} %; {:.1f} ms a frame, p99 {:.1f} ms\n",
+      errors.localized,
+      errors.frames,
+      errors.median_m,
+      errors.median_rad * kDegrees,
+      errors.p95_m,
+      100.0 * errors.within_1m,
+      100.0 * errors.within_95,
+      errors.median_ms,
+      errors.p99_ms);
+}
+
+/// What the report folder gets, besides the poses of the held-out frames.
+std::string FormatReport(const TrainedMap& trained, const MapTrainingOptions& options) {
+  std::string text = "held-out training frames: " + FormatErrors(trained.held_out);
+  for (const MapRegion& region : trained.map.regions) {
+    text += fmt::format(
+        "{}: {} training frames, covariance factor {:.1f}, confidence threshold {:.3f}\n",
+        region.name,
+        region.training_poses.size(),
+        region.calibration.covariance_factor,
+        region.calibration.confidence_threshold);
+  }
+  text += fmt::format("{} iterations of {}, seed {}, {:.0f} s with {} threads\n",
+                      options.head.iterations,
+                      options.head.batch,
+                      options.seed,
+                      trained.map.training.training_seconds,
+                      options.threads);
+  return text;
+}
+
+struct TrainCommand {
+  FrameSelection frames;
+  std::string out;
+  std::string report;
+  MapTrainingOptions options;
+};
+
+Result<int> Train(const TrainCommand& command) {
+  const auto selected = SelectFrames(command.frames, SplitPart::kTrain);
+  if (!selected) return selected.error();
+  auto trained = TrainMap(*selected, command.options);
+  if (!trained) return std::move(trained).error();
+  if (auto written = WriteMap(trained->map, command.out); !written) return written.error();
+  const std::string report = FormatReport(*trained, command.options);
+  fmt::print("{}", report);
+  if (command.report.empty()) return kExitOk;
+  std::error_code failed;
+  std::filesystem::create_directories(command.report, failed);  // what fails shows on writing
+  for (const auto& [name, text] :
+       {std::pair<std::string, std::string>{"/report.txt", report},
+        {"/held_out_poses.csv", FormatPoses(trained->map, trained->localizations)}}) {
+    if (auto written = WriteFileAtomically(command.report + name, text); !written) {
+      return written.error();
+    }
+  }
+  return kExitOk;
+}
+
+struct LocalizeCommand {
+  FrameSelection frames;
+  std::string map;
+  std::string out;
+  int threads = 1;
+};
+
+Result<int> Localize(const LocalizeCommand& command) {
+  const auto map = ReadMap(command.map);
+  if (!map) return map.error();
+  const auto selected = SelectFrames(command.frames, SplitPart::kTest);
+  if (!selected) return selected.error();
+  const auto localizations = LocalizeFrames(*map, selected->dataset.frames, {}, command.threads);
+  if (!localizations) return localizations.error();
+  if (auto written = WriteFileAtomically(command.out, FormatPoses(*map, *localizations));
+      !written) {
+    return written.error();
+  }
+  fmt::print("{}", FormatErrors(MeasureErrors(*map, *localizations)));
+  return kExitOk;
+}
+
+std::string FormatInfo(const SceneMap& map) {
+  const TrainingSummary& training = map.training;
+  std::string text = fmt::format(
+      "id        {}\n"
+      "format    {}\n"
+      "camera    {} x {} px, f {:.2f} {:.2f}, centre {:.2f} {:.2f}\n"
+      "features  {} octaves at {} x {} px, every {} px, {} -> {} dimensions, {} cells an image\n"
+      "training  {} frames of {}, seed {}, {:.0f} s, program {}\n"
+      "held out  {} frames: median {:.3f} m {:.3f} deg, p95 {:.3f} m, within 1 m {:.1f} %\n",
+      map.id,
+      kMapFormatVersion,
+      map.camera.width,
+      map.camera.height,
+      map.camera.fx,
+      map.camera.fy,
+      map.camera.cx,
+      map.camera.cy,
+      map.features.octaves,
+      map.features.working_width,
+      map.features.working_height,
+      map.features.cell_stride,
+      map.whitening.inputs,
+      map.whitening.outputs,
+      map.cells_per_image,
+      training.training_frames,
+      training.dataset,
+      training.seed,
+      training.training_seconds,
+      training.program_version,
+      training.held_out_frames,
+      training.median_error_m,
+      training.median_error_rad * kDegrees,
+      training.p95_error_m,
+      100.0 * training.within_1m);
+  for (const MapRegion& region : map.regions) {
+    text += fmt::format(
+        "{}   {} blocks of {}, around ({:.1f}, {:.1f}, {:.1f}) m, {} training poses, covariance "
+        "factor {:.1f}, confidence threshold {:.3f}\n",
+        region.name,
+        region.head.shape.blocks,
+        region.head.shape.width,
+        region.head.centre_W.x(),
+        region.head.centre_W.y(),
+        region.head.centre_W.z(),
+        region.training_poses.size(),
+        region.calibration.covariance_factor,
+        region.calibration.confidence_threshold);
+  }
+  return text;
+}
+
+/// As a JSON string: quoted, with what must be escaped escaped.
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      quoted += '\\';
+      quoted += c;
+    } else if (static_cast<unsigned char>(c) < 0x20U) {
+      quoted += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+std::string FormatInfoJson(const SceneMap& map) {
+  const TrainingSummary& training = map.training;
+  std::string regions;
+  for (const MapRegion& region : map.regions) {
+    regions += fmt::format(
+        R"({}{{"name": {}, "training_poses": {}, "covariance_factor": {}, "confidence_threshold": {}}})",
+        regions.empty() ? "" : ", ",
+        Quoted(region.name),
+        region.training_poses.size(),
+        region.calibration.covariance_factor,
+        region.calibration.confidence_threshold);
+  }
+  return fmt::format(
+      R"({{"id": "{}", "format_version": {}, "image_width": {}, "image_height": {}, "dataset": {}, )"
+      R"("seed": {}, "training_frames": {}, "training_seconds": {}, "held_out_frames": {}, )"
+      R"("median_error_m": {}, "median_error_rad": {}, "p95_error_m": {}, "within_1m": {}, )"
+      R"("regions": [{}]}})"
+      "\n",
+      map.id,
+      kMapFormatVersion,
+      map.camera.width,
+      map.camera.height,
+      Quoted(training.dataset),
+      training.seed,
+      training.training_frames,
+      training.training_seconds,
+      training.held_out_frames,
+      training.median_error_m,
+      training.median_error_rad,
+      training.p95_error_m,
+      training.within_1m,
+      regions);
+}
+
+Result<int> Info(const std::string& path, bool json) {
+  const auto map = ReadMap(path);
+  if (!map) return map.error();
+  fmt::print("{}", json ? FormatInfoJson(*map) : FormatInfo(*map));
+  return kExitOk;
+}
+
+int Finish(const Result<int>& result) {
+  if (result) return *result;
+  fmt::print(stderr, "reloc map: {}\n", result.error().message);
+  return ExitCode(result.error());
+}
+
+void AddFrameOptions(CLI::App& command, FrameSelection& frames, const char* split_help) {
+  command.add_option("--dataset", frames.dataset, "folder of the data set")->required();
+  command.add_option("--split", frames.split, split_help);
+  command.add_option("--frames", frames.frames, "A:B, only frames with these indices");
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("Makes a map of a recorded drive, and finds images in it.", "reloc map");
+  app.require_subcommand(1);
+
+  TrainCommand train;
+  auto* train_app = app.add_subcommand("train", "make a map of a data set");
+  AddFrameOptions(*train_app, train.frames, "file of the split: its train rows are used");
+  train_app->add_option("--out", train.out, "the map file to write")->required();
+  train_app->add_option("--threads", train.options.threads, "default 2");
+  train_app->add_option("--seed", train.options.seed, "default 1");
+  train_app->add_option("--report", train.report, "folder for a report on held-out frames");
+  train_app->add_option("--iterations", train.options.head.iterations, "steps for each region");
+  train_app->add_option("--views", train.options.cells.views_per_image, "changed copies an image");
+  train_app->add_option("--held-out-every", train.options.held_out_every, "default 8");
+  train_app->add_option("--region-length", train.options.region_length_m, "default 150 m");
+
+  LocalizeCommand localize;
+  auto* localize_app = app.add_subcommand("localize", "find the images of a data set in a map");
+  localize_app->add_option("--map", localize.map, "the map file")->required();
+  AddFrameOptions(*localize_app, localize.frames, "file of the split: its test rows are used");
+  localize_app->add_option("--out", localize.out, "poses.csv to write")->required();
+  localize_app->add_option("--threads", localize.threads, "default 1");
+
+  std::string map_path;
+  bool json = false;
+  auto* info_app = app.add_subcommand("info", "what is in a map");
+  info_app->add_option("map", map_path, "the map file")->required();
+  info_app->add_flag("--json", json, "for scripts");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitOk : kExitUsage;
+  }
+  if (train_app->parsed()) return Finish(Train(train));
+  if (localize_app->parsed()) return Finish(Localize(localize));
+  return Finish(Info(map_path, json));
+}
+
+}  // namespace
+}  // namespace relocd
+
+int main(int argc, char** argv) {
+  return relocd::Main(argc, argv);
+}
