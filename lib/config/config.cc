@@ -1,5 +1,7 @@
 #include "config/config.h"
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
@@ -44,9 +46,21 @@ void CompletePath(const std::filesystem::path& directory, std::string& path) {
 }
 
 void CompletePaths(const std::filesystem::path& directory, Config& config) {
+  for (auto& [name, camera] : config.cameras)
+    CompletePath(directory, camera.file.dataset);
   CompletePath(directory, config.can.path);
   CompletePath(directory, config.can.dbc_file);
   CompletePath(directory, config.recorder.directory);
+}
+
+/// The name becomes part of a channel's.
+Result<void> CheckCameraName(const std::string& name) {
+  const bool valid = !name.empty() && std::all_of(name.begin(), name.end(), [](char letter) {
+    return std::isalnum(static_cast<unsigned char>(letter)) != 0 || letter == '_';
+  });
+  if (valid) return {};
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("cameras.{} has a name that is not of letters, digits and _", name)};
 }
 
 }  // namespace
@@ -62,14 +76,19 @@ Result<void> BusConfig::Validate() const {
 }
 
 Result<void> Config::Validate() const {
-  const auto check = [](const char* section, const auto& config) -> Result<void> {
+  const auto check = [](const std::string& section, const auto& config) -> Result<void> {
     auto ok = config.Validate();
     if (ok) return ok;
     const Error error = std::move(ok).error();
     return Error{error.kind, fmt::format("{}.{}", section, error.message)};
   };
   if (auto ok = check("bus", bus); !ok) return ok;
+  for (const auto& [name, camera] : cameras) {
+    if (auto ok = CheckCameraName(name); !ok) return ok;
+    if (auto ok = check("cameras." + name, camera); !ok) return ok;
+  }
   if (auto ok = check("can", can); !ok) return ok;
+  if (auto ok = check("odometry", odometry); !ok) return ok;
   if (auto ok = check("recorder", recorder); !ok) return ok;
   return check("supervisor", supervisor);
 }

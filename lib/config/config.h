@@ -1,10 +1,13 @@
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
+#include "camera/camera_config.h"
 #include "can/can_config.h"
 #include "core/result.h"
+#include "odometry/wheel_odometry.h"
 #include "recording/recorder_config.h"
 #include "supervision/process_spec.h"
 
@@ -27,14 +30,20 @@ struct BusConfig {
 /// All that a robot's YAML file says: the modules' structs, put together.
 struct Config {
   BusConfig bus;
+  std::map<std::string, CameraConfig> cameras{{"front", CameraConfig()}};
   CanConfig can;
+  OdometryConfig odometry;
   RecorderConfig recorder;
   SupervisionConfig supervisor;
 
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("bus", self.bus, "The LCM networks between the daemons.");
+    visit("cameras",
+          self.cameras,
+          "camerad: one for each camera, by a name of letters, digits and _.");
     visit("can", self.can, "odometryd: where the vehicle's CAN frames come from.");
+    visit("odometry", self.odometry, "odometryd: how the wheels move the body.");
     visit("recorder", self.recorder, "recorderd: what is kept of the messages.");
     visit("supervisor", self.supervisor, "relocd: the daemons it starts and watches.");
   }

@@ -63,6 +63,19 @@ TEST_F(ConfigTest, RefusesNetworksThatWouldHearEachOther) {
   EXPECT_THAT(config.error().message, HasSubstr("bus.image_url has port 7667 as control_url has"));
 }
 
+TEST_F(ConfigTest, CamerasHaveNames) {
+  const auto config = Load("cameras:\n  left: {width: 320}\n  right: {}\n");
+  ASSERT_TRUE(config) << config.error().message;
+  ASSERT_EQ(config->cameras.size(), 2U);
+  EXPECT_EQ(config->cameras.at("left").width, 320);
+  EXPECT_EQ(config->cameras.at("right").width, CameraConfig().width);
+}
+
+TEST_F(ConfigTest, NamesTheLineOfABadCamera) {
+  EXPECT_EQ(Load("cameras:\n  left: {}\n  right:\n    width: 3\n").error().message,
+            path_ + ": line 4: cameras.right.width is 3, must be in [16, 8192]");
+}
+
 TEST_F(ConfigTest, PathsAreRelativeToTheFile) {
   const auto config = Load("can: {dbc_file: vehicles/rover.dbc}\nrecorder: {directory: /log}\n");
   ASSERT_TRUE(config) << config.error().message;

@@ -1,0 +1,333 @@
+#include "odometry/wheel_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "odometry/wheel_encoder.h"
+
+namespace relocd {
+namespace {
+
+/// Front and rear axle of a car that creeps round a corner differ by more than a part of it.
+constexpr double kAxleDifference = 0.5;  // m/s
+
+double Square(double value) {
+  return value * value;
+}
+
+Error Invalid(const char* name, double value, const std::string& allowed) {
+  return {ErrorKind::kInvalidInput, fmt::format("{} is {}, must be {}", name, value, allowed)};
+}
+
+Error InSection(const char* section, const Error& error) {
+  return {error.kind, fmt::format("{}.{}", section, error.message)};
+}
+
+}  // namespace
+
+Result<void> OdometryConfig::Validate() const {
+  if (auto ok = wheels.Validate(); !ok) return InSection("wheels", ok.error());
+  if (auto ok = drive.Validate(); !ok) return InSection("drive", ok.error());
+  struct Field {
+    const char* name;
+    double value;
+  };
+  // `!(value > 0)` is also true of NaN.
+  for (const Field& field : {Field{"max_interval_s", max_interval_s},
+                             Field{"stale_period_s", stale_period_s},
+                             Field{"max_speed_mps", max_speed_mps},
+                             Field{"max_yaw_rate_radps", max_yaw_rate_radps},
+                             Field{"max_acceleration_mps2", max_acceleration_mps2},
+                             Field{"max_axle_difference", max_axle_difference},
+                             Field{"slip_sigma", slip_sigma},
+                             Field{"unknown_acceleration_mps2", unknown_acceleration_mps2}}) {
+    if (!(field.value > 0.0) || !std::isfinite(field.value)) {
+      return Invalid(field.name, field.value, "positive and finite");
+    }
+  }
+  for (const Field& field : {Field{"extrapolate_s", extrapolate_s},
+                             Field{"standstill_speed_mps", standstill_speed_mps},
+                             Field{"standstill_after_s", standstill_after_s}}) {
+    if (!(field.value >= 0.0) || !std::isfinite(field.value)) {
+      return Invalid(field.name, field.value, "at least 0 and finite");
+    }
+  }
+  if (!(stale_after_s >= max_interval_s) || !std::isfinite(stale_after_s)) {
+    return Invalid(
+        "stale_after_s", stale_after_s, fmt::format("at least max_interval_s, {}", max_interval_s));
+  }
+  return {};
+}
+
+Result<WheelOdometry> WheelOdometry::Create(const OdometryConfig& config, const DbcFile& dbc) {
+  if (auto ok = config.Validate(); !ok) return std::move(ok).error();
+  auto signals = WheelSignals::Create(config.wheels, dbc);
+  if (!signals) return std::move(signals).error();
+  WheelOdometry odometry(config, std::move(signals).value());
+  if (odometry.IsAmbiguous(config.max_interval_s)) {
+    return Invalid("max_speed_mps",
+                   config.max_speed_mps,
+                   "less, or the counters go round more than half their range in max_interval_s");
+  }
+  return odometry;
+}
+
+std::optional<OdometryIncrement> WheelOdometry::Handle(const CanFrame& frame) {
+  last_sample_ = signals_.Handle(frame);
+  if (!last_sample_) return std::nullopt;
+  const WheelSample& sample = *last_sample_;
+  ++counters_.samples;
+  if (sample.refused_frames > 0) pending_flags_ |= kOdometryChecksum;
+  if (sample.missing_frames > 0) pending_flags_ |= kOdometryGap;
+  if (!anchor_) return Begin(sample);
+  if (sample.time <= anchor_->sample.time) {
+    ++counters_.out_of_order;
+    return std::nullopt;
+  }
+
+  const double duration_s = ToSeconds(sample.time - anchor_->sample.time);
+  if (IsAmbiguous(duration_s)) {
+    pending_flags_ |= kOdometryGap;
+    return Accept(sample, Extrapolate(duration_s));
+  }
+  if (const auto travel = MeasuredTravel(anchor_->sample, sample)) return Accept(sample, *travel);
+
+  pending_flags_ |= kOdometryJump;
+  ++counters_.jumps;
+  // Counters that agree with those refused before, and not with those accepted, were set anew.
+  const bool were_reset = signals_.are_ticks() && suspect_ && suspect_->time < sample.time &&
+                          MeasuredTravel(*suspect_, sample);
+  if (were_reset) return Accept(sample, Extrapolate(duration_s));
+  suspect_ = sample;
+  return std::nullopt;
+}
+
+OdometryIncrement WheelOdometry::Begin(const WheelSample& sample) {
+  anchor_.emplace();
+  anchor_->sample = sample;
+  if (signals_.are_ticks()) {
+    for (std::size_t i = 0; i < 2; ++i)
+      anchor_->ticks.at(i) = static_cast<std::int64_t>(sample.ticks.at(i));
+  } else {
+    anchor_->speeds_mps = ScaledSpeeds(sample);
+    anchor_->has_speeds = true;
+  }
+  time_ = sample.time;
+  return Publish(sample.time, {}, std::exchange(pending_flags_, 0));
+}
+
+std::optional<OdometryIncrement> WheelOdometry::Accept(const WheelSample& sample,
+                                                       const WheelTravel& travel) {
+  suspect_.reset();
+  std::int32_t flags = std::exchange(pending_flags_, 0);
+  if (travel.duration_s > config_.max_interval_s) flags |= kOdometryGap;
+  if (IsSlipping(sample, travel)) flags |= kOdometrySlip;
+  if (UpdateStandstill(sample, travel)) flags |= kOdometryStandstill;
+  if ((flags & kOdometryGap) != 0) ++counters_.gaps;
+  if ((flags & kOdometrySlip) != 0) ++counters_.slips;
+
+  BodyMotion motion = Motion(travel, (flags & kOdometryGap) != 0, (flags & kOdometrySlip) != 0);
+  MoveAnchor(sample, travel, motion.X_BiBj);
+  if (!is_guess_) return Publish(sample.time, motion, flags);
+
+  // The guesses that were published meanwhile are taken back in part: what they had wrong is in
+  // this motion now.
+  guessed_covariance_ += motion.covariance;
+  if (sample.time <= time_) {
+    pending_flags_ = flags & ~kOdometryStandstill;
+    return std::nullopt;
+  }
+  motion.X_BiBj = X_OB_.Inverse() * anchor_->X_OB;
+  motion.covariance = std::exchange(guessed_covariance_, Eigen::Matrix3d::Zero());
+  is_guess_ = false;
+  return Publish(sample.time, motion, flags);
+}
+
+void WheelOdometry::MoveAnchor(const WheelSample& sample,
+                               const WheelTravel& travel,
+                               const Pose2& X_BiBj) {
+  if (signals_.are_ticks()) {
+    const std::array<int, 2> bits = signals_.counter_bits();
+    for (std::size_t i = 0; i < 2; ++i) {
+      anchor_->ticks.at(i) +=
+          TickDifference(anchor_->sample.ticks.at(i), sample.ticks.at(i), bits.at(i));
+    }
+  }
+  anchor_->speeds_mps = SpeedsAt(sample, travel);
+  anchor_->has_speeds = true;
+  anchor_->sample = sample;
+  anchor_->X_OB = anchor_->X_OB * X_BiBj;
+}
+
+OdometryIncrement WheelOdometry::Publish(MonotonicTime time,
+                                         const BodyMotion& motion,
+                                         std::int32_t flags) {
+  X_OB_ = is_guess_ ? X_OB_ * motion.X_BiBj : anchor_->X_OB;
+  Eigen::Vector3d twist = BodyTwist(config_.drive.track_m, anchor_->speeds_mps);
+  if (is_guess_) twist = motion.X_BiBj.Log() / ToSeconds(time - time_);
+  OdometryIncrement increment{.previous_time = std::exchange(time_, time),
+                              .time = time,
+                              .X_BiBj = motion.X_BiBj,
+                              .covariance = motion.covariance,
+                              .X_OB = X_OB_,
+                              .speed_mps = twist.x(),
+                              .yaw_rate_radps = twist.z(),
+                              .flags = flags,
+                              .ticks = std::nullopt};
+  if (signals_.are_ticks()) increment.ticks = anchor_->ticks;
+  return increment;
+}
+
+std::optional<OdometryIncrement> WheelOdometry::Tick(MonotonicTime now) {
+  if (!anchor_) return std::nullopt;
+  const Duration age = now - anchor_->sample.time;
+  if (age <= FromSeconds(config_.stale_after_s)) return std::nullopt;
+  if (now - time_ < FromSeconds(config_.stale_period_s)) return std::nullopt;
+
+  const WheelTravel before = Extrapolate(ToSeconds(time_ - anchor_->sample.time));
+  const WheelTravel after = Extrapolate(ToSeconds(age));
+  const BodyMotion motion =
+      MotionFromTravel(config_.drive,
+                       {.travel_m = after.travel_m - before.travel_m,
+                        .variance_m2 = (after.variance_m2 - before.variance_m2).cwiseMax(0.0),
+                        .duration_s = ToSeconds(now - time_)});
+  is_guess_ = true;
+  guessed_covariance_ += motion.covariance;
+  ++counters_.guesses;
+  return Publish(now, motion, kOdometryStale);
+}
+
+std::optional<WheelTravel> WheelOdometry::MeasuredTravel(const WheelSample& from,
+                                                         const WheelSample& to) const {
+  const WheelTravel travel =
+      signals_.are_ticks() ? TravelFromTicks(from, to) : TravelFromSpeeds(from, to);
+  const double fastest = signals_.are_ticks() ? travel.travel_m.cwiseAbs().maxCoeff() /
+                                                    JudgedInterval(travel.duration_s)
+                                              : ScaledSpeeds(to).cwiseAbs().maxCoeff();
+  if (!(fastest <= config_.max_speed_mps)) return std::nullopt;
+  return travel;
+}
+
+WheelTravel WheelOdometry::TravelFromTicks(const WheelSample& from, const WheelSample& to) const {
+  const std::array<int, 2> bits = signals_.counter_bits();
+  const Eigen::Vector2d metres_per_tick = MetresPerTick();
+  const Eigen::Vector2d ticks(
+      static_cast<double>(TickDifference(from.ticks[0], to.ticks[0], bits[0])),
+      static_cast<double>(TickDifference(from.ticks[1], to.ticks[1], bits[1])));
+  return {.travel_m = metres_per_tick.cwiseProduct(ticks),
+          // The difference of two roundings, each uniform within a tick.
+          .variance_m2 = metres_per_tick.cwiseAbs2() / 6.0,
+          .duration_s = ToSeconds(to.time - from.time)};
+}
+
+WheelTravel WheelOdometry::TravelFromSpeeds(const WheelSample& from, const WheelSample& to) const {
+  const double duration_s = ToSeconds(to.time - from.time);
+  const std::array<double, 2> resolution = signals_.speed_resolution_mps();
+  const Eigen::Vector2d rounding_m = duration_s * Eigen::Vector2d(resolution[0], resolution[1]);
+  return {.travel_m = 0.5 * duration_s * (ScaledSpeeds(from) + ScaledSpeeds(to)),
+          .variance_m2 = rounding_m.cwiseAbs2() / 12.0,
+          .duration_s = duration_s};
+}
+
+WheelTravel WheelOdometry::Extrapolate(double duration_s) const {
+  const double kept_s = std::min(duration_s, config_.extrapolate_s);
+  const double changed_m = std::min(0.5 * config_.unknown_acceleration_mps2 * Square(duration_s),
+                                    config_.max_speed_mps * duration_s);
+  const Eigen::Vector2d not_kept_m = anchor_->speeds_mps.cwiseAbs() * (duration_s - kept_s);
+  return {.travel_m = anchor_->speeds_mps * kept_s,
+          .variance_m2 = (not_kept_m.array() + changed_m).square().matrix(),
+          .duration_s = duration_s};
+}
+
+bool WheelOdometry::IsAmbiguous(double duration_s) const {
+  if (!signals_.are_ticks()) return false;
+  const double furthest_m = config_.max_speed_mps * JudgedInterval(duration_s);
+  const Eigen::Vector2d metres_per_tick = MetresPerTick();
+  const std::array<int, 2> bits = signals_.counter_bits();
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double ticks = furthest_m / std::abs(metres_per_tick[static_cast<Eigen::Index>(i)]);
+    if (ticks >= static_cast<double>(MaxTickDifference(bits.at(i)))) return true;
+  }
+  return false;
+}
+
+bool WheelOdometry::IsSlipping(const WheelSample& sample, const WheelTravel& travel) const {
+  const double interval_s = JudgedInterval(travel.duration_s);
+  const Eigen::Vector3d twist = BodyTwist(config_.drive.track_m, travel.travel_m / interval_s);
+  if (std::abs(twist.z()) > config_.max_yaw_rate_radps) return true;
+
+  const Eigen::Vector2d speeds_mps = SpeedsAt(sample, travel);
+  const double change = (speeds_mps - anchor_->speeds_mps).cwiseAbs().maxCoeff();
+  if (anchor_->has_speeds && change > config_.max_acceleration_mps2 * interval_s) return true;
+
+  if (!signals_.has_front()) return false;
+  const double front = 0.5 * (sample.front_speeds_mps[0] + sample.front_speeds_mps[1]);
+  const double rear = speeds_mps.mean();
+  const double faster = std::max(std::abs(front), std::abs(rear));
+  return std::abs(front - rear) > config_.max_axle_difference * faster + kAxleDifference;
+}
+
+BodyMotion WheelOdometry::Motion(WheelTravel travel, bool is_gap, bool is_slipping) const {
+  const double acceleration = config_.unknown_acceleration_mps2;
+  const double squared_s2 = Square(travel.duration_s);
+  if (is_slipping) {
+    const double slip_m = config_.slip_sigma * travel.travel_m.cwiseAbs().maxCoeff();
+    travel.variance_m2.array() += Square(slip_m);
+  }
+  if (is_gap && !signals_.are_ticks()) {
+    // How far off the trapezoid of two speeds can be if the wheel sped up and down again between.
+    travel.variance_m2.array() += Square(0.25 * acceleration * squared_s2);
+  }
+  BodyMotion motion = MotionFromTravel(config_.drive, travel);
+  if (is_gap) {
+    // The heading may have gone another way than evenly: off by up to alpha T^2 / 8 in the middle,
+    // which moves the end sideways by two thirds of that per metre.
+    const double yaw_acceleration = 2.0 * acceleration / config_.drive.track_m;
+    const double off_rad = std::min(yaw_acceleration * squared_s2 / 12.0, std::numbers::pi);
+    motion.covariance(1, 1) += Square(travel.travel_m.mean() * off_rad);
+  }
+  return motion;
+}
+
+bool WheelOdometry::UpdateStandstill(const WheelSample& sample, const WheelTravel& travel) {
+  const bool is_still =
+      signals_.are_ticks()
+          ? sample.ticks == anchor_->sample.ticks && travel.travel_m.isZero(0.0)
+          : ScaledSpeeds(sample).cwiseAbs().maxCoeff() <= config_.standstill_speed_mps;
+  if (!is_still) {
+    still_since_.reset();
+    return false;
+  }
+  if (!still_since_) still_since_ = anchor_->sample.time;
+  return sample.time - *still_since_ >= FromSeconds(config_.standstill_after_s);
+}
+
+Eigen::Vector2d WheelOdometry::ScaledSpeeds(const WheelSample& sample) const {
+  return {sample.speeds_mps[0] * config_.drive.left_scale,
+          sample.speeds_mps[1] * config_.drive.right_scale};
+}
+
+/// Frames that wait together are stamped closer to each other than they were measured, so that
+/// ticks over their time would be any speed.
+Eigen::Vector2d WheelOdometry::SpeedsAt(const WheelSample& sample,
+                                        const WheelTravel& travel) const {
+  if (!signals_.are_ticks()) return ScaledSpeeds(sample);
+  constexpr double kShortest = 0.2;  // of the longest interval that is regular
+  return travel.travel_m / std::max(travel.duration_s, kShortest * config_.max_interval_s);
+}
+
+Eigen::Vector2d WheelOdometry::MetresPerTick() const {
+  const double turn = 2.0 * std::numbers::pi / config_.drive.ticks_per_revolution;
+  return {turn * config_.drive.left_radius_m * config_.drive.left_scale,
+          turn * config_.drive.right_radius_m * config_.drive.right_scale};
+}
+
+double WheelOdometry::JudgedInterval(double duration_s) const {
+  return std::max(duration_s, config_.max_interval_s);
+}
+
+}  // namespace relocd

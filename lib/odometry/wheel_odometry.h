@@ -1,0 +1,189 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "can/can_frame.h"
+#include "can/dbc.h"
+#include "core/result.h"
+#include "core/time.h"
+#include "geometry/pose2.h"
+#include "odometry/differential_drive.h"
+#include "odometry/wheel_signals.h"
+
+namespace relocd {
+
+struct OdometryConfig {
+  WheelSignalsConfig wheels;
+  DifferentialDriveConfig drive;
+  double max_interval_s = 0.05;
+  double stale_after_s = 0.2;
+  double stale_period_s = 0.1;
+  double extrapolate_s = 0.5;
+  double max_speed_mps = 5.0;
+  double max_yaw_rate_radps = 6.0;
+  double max_acceleration_mps2 = 20.0;
+  double max_axle_difference = 0.3;
+  double slip_sigma = 0.3;
+  double unknown_acceleration_mps2 = 1.0;
+  double standstill_speed_mps = 0.02;
+  double standstill_after_s = 0.3;
+
+  template <typename Self, typename Visitor>
+  static void VisitFields(Self& self, Visitor&& visit) {
+    visit("wheels", self.wheels, "The signals of the wheels in the DBC file.");
+    visit("drive", self.drive, "The geometry of the wheels, and how well they measure.");
+    visit("max_interval_s",
+          self.max_interval_s,
+          "> 0; two measurements further apart are a gap, and their covariance is inflated");
+    visit("stale_after_s",
+          self.stale_after_s,
+          ">= max_interval_s; without a measurement for longer, guessed ones are published");
+    visit("stale_period_s", self.stale_period_s, "> 0; between two guessed measurements");
+    visit("extrapolate_s",
+          self.extrapolate_s,
+          ">= 0; for how long a guess takes the wheels to keep their speed");
+    visit(
+        "max_speed_mps", self.max_speed_mps, "> 0; a wheel that goes faster is refused as a jump");
+    visit("max_yaw_rate_radps",
+          self.max_yaw_rate_radps,
+          "> 0; wheels that turn the body faster are slipping");
+    visit("max_acceleration_mps2",
+          self.max_acceleration_mps2,
+          "> 0; a wheel that changes its speed faster is slipping");
+    visit("max_axle_difference",
+          self.max_axle_difference,
+          "> 0; front and rear axle whose speeds differ by more than this part are slipping");
+    visit("slip_sigma", self.slip_sigma, "> 0; of the travel of a slipping wheel, as part of it");
+    visit("unknown_acceleration_mps2",
+          self.unknown_acceleration_mps2,
+          "> 0; what the wheels may do unseen: inflates the covariance of gaps and guesses");
+    visit("standstill_speed_mps",
+          self.standstill_speed_mps,
+          ">= 0; wheels that report at most this speed stand");
+    visit("standstill_after_s",
+          self.standstill_after_s,
+          ">= 0; for so long they must, to be flagged");
+  }
+
+  /// @return kInvalidInput, naming the field, its value and what is allowed.
+  [[nodiscard]] Result<void> Validate() const;
+};
+
+/// What an increment is flagged with. The numbers are those of odometry_t.
+enum OdometryFlag : std::int32_t {
+  kOdometryStale = 1,
+  kOdometryGap = 2,
+  kOdometryChecksum = 4,
+  kOdometrySlip = 8,
+  kOdometryJump = 16,
+  kOdometryStandstill = 32,
+};
+
+/// How the body moved since the increment before.
+struct OdometryIncrement {
+  MonotonicTime previous_time{};  ///< Of the increment before; `time` itself in the first.
+  MonotonicTime time{};
+  Pose2 X_BiBj;                                          ///< The motion in between.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< 3x3 of its right perturbation.
+  Pose2 X_OB;              ///< All motions composed, from where the first increment found the body.
+  double speed_mps = 0.0;  ///< Forward, of B's origin.
+  double yaw_rate_radps = 0.0;
+  std::int32_t flags = 0;                            ///< A sum of OdometryFlag.
+  std::optional<std::array<std::int64_t, 2>> ticks;  ///< Unwrapped, left and right.
+};
+
+/// Turns CAN frames into motion increments: WheelSignals -> plausibility -> MotionFromTravel.
+///
+/// Increments follow each other without a hole: composed, they give X_OB. While no measurement
+/// comes, Tick guesses increments whose covariance grows fast; the first measurement after that
+/// takes back what the guesses had wrong (ticks also tell how far the wheels went meanwhile), with
+/// a covariance that covers it.
+///
+/// Thread-bound; reads no clock.
+class WheelOdometry {
+ public:
+  /// @return kInvalidInput, as Validate and WheelSignals::Create.
+  static Result<WheelOdometry> Create(const OdometryConfig& config, const DbcFile& dbc);
+
+  /// The increment that this frame completes. The first measurement gives one without motion.
+  std::optional<OdometryIncrement> Handle(const CanFrame& frame);
+
+  /// A guessed increment, flagged stale, when measurements are missing for too long.
+  std::optional<OdometryIncrement> Tick(MonotonicTime now);
+
+  /// The measurements that the last frame given to Handle completed, accepted or not.
+  [[nodiscard]] const std::optional<WheelSample>& last_sample() const { return last_sample_; }
+  [[nodiscard]] const WheelSignals& signals() const { return signals_; }
+
+  struct Counters {
+    std::int64_t samples = 0;       ///< Sets of measurements, accepted or not.
+    std::int64_t gaps = 0;          ///< Increments that bridge missing measurements.
+    std::int64_t jumps = 0;         ///< Sets refused as implausible.
+    std::int64_t slips = 0;         ///< Increments of slipping wheels.
+    std::int64_t out_of_order = 0;  ///< Sets refused, since their time did not increase.
+    std::int64_t guesses = 0;       ///< Increments made by Tick.
+  };
+  [[nodiscard]] const Counters& counters() const { return counters_; }
+
+ private:
+  /// The last measurement that was accepted, and what follows from it.
+  struct Anchor {
+    WheelSample sample;
+    Eigen::Vector2d speeds_mps = Eigen::Vector2d::Zero();  ///< Of the wheels, scaled.
+    bool has_speeds = false;                               ///< One reading of ticks has none.
+    std::array<std::int64_t, 2> ticks{};                   ///< Unwrapped.
+    Pose2 X_OB;
+  };
+
+  WheelOdometry(const OdometryConfig& config, WheelSignals signals)
+      : config_(config), signals_(std::move(signals)) {}
+
+  OdometryIncrement Begin(const WheelSample& sample);
+  std::optional<OdometryIncrement> Accept(const WheelSample& sample, const WheelTravel& travel);
+  void MoveAnchor(const WheelSample& sample, const WheelTravel& travel, const Pose2& X_BiBj);
+  OdometryIncrement Publish(MonotonicTime time, const BodyMotion& motion, std::int32_t flags);
+
+  /// The travel that two measurements tell; nothing when they cannot both be right, or the counters
+  /// may have gone round.
+  [[nodiscard]] std::optional<WheelTravel> MeasuredTravel(const WheelSample& from,
+                                                          const WheelSample& to) const;
+  [[nodiscard]] WheelTravel TravelFromTicks(const WheelSample& from, const WheelSample& to) const;
+  [[nodiscard]] WheelTravel TravelFromSpeeds(const WheelSample& from, const WheelSample& to) const;
+  /// A guess of the travel within `duration_s` after the anchor.
+  [[nodiscard]] WheelTravel Extrapolate(double duration_s) const;
+  /// Whether a counter may have gone round more than half its range.
+  [[nodiscard]] bool IsAmbiguous(double duration_s) const;
+  [[nodiscard]] bool IsSlipping(const WheelSample& sample, const WheelTravel& travel) const;
+  /// The motion, with a covariance that covers what was not seen of it, or slipped.
+  [[nodiscard]] BodyMotion Motion(WheelTravel travel, bool is_gap, bool is_slipping) const;
+  bool UpdateStandstill(const WheelSample& sample, const WheelTravel& travel);
+
+  [[nodiscard]] Eigen::Vector2d ScaledSpeeds(const WheelSample& sample) const;
+  [[nodiscard]] Eigen::Vector2d SpeedsAt(const WheelSample& sample,
+                                         const WheelTravel& travel) const;
+  [[nodiscard]] Eigen::Vector2d MetresPerTick() const;
+  /// The shortest interval over which a rate is judged. Frames that wait together are stamped
+  /// closer to each other than they were measured.
+  [[nodiscard]] double JudgedInterval(double duration_s) const;
+
+  OdometryConfig config_;
+  WheelSignals signals_;
+  std::optional<WheelSample> last_sample_;
+  std::optional<Anchor> anchor_;
+  std::optional<WheelSample> suspect_;  ///< The last set that was refused as a jump.
+  std::optional<MonotonicTime> still_since_;
+
+  MonotonicTime time_{};  ///< Of the last increment.
+  Pose2 X_OB_;            ///< Of the last increment: the anchor's, or a guess.
+  bool is_guess_ = false;
+  Eigen::Matrix3d guessed_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the guesses since.
+  std::int32_t pending_flags_ = 0;                                ///< For the next increment.
+  Counters counters_;
+};
+
+}  // namespace relocd

@@ -1,0 +1,394 @@
+#include "odometry/wheel_odometry.h"
+
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "geometry/covariance.h"
+#include "support/eigen_matchers.h"
+#include "support/wheel_ticks_frame.h"
+
+namespace relocd {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t kPeriodNs = 10'000'000;
+
+/// One tick is one millimetre.
+OdometryConfig TicksConfig() {
+  OdometryConfig config;
+  config.wheels.counter_signal = "WHEEL_TICKS.COUNTER";
+  config.wheels.checksum_signal = "WHEEL_TICKS.CHECKSUM";
+  config.wheels.checksum_rule = "crc8_j1850";
+  config.drive.left_radius_m = 0.5 / std::numbers::pi;
+  config.drive.right_radius_m = 0.5 / std::numbers::pi;
+  config.drive.ticks_per_revolution = 1000;
+  config.max_interval_s = 0.025;
+  return config;
+}
+
+/// A robot that sends a frame every 10 ms, and the odometry under test.
+class WheelOdometryTest : public testing::Test {
+ protected:
+  /// Drives for one period, and sends the frame.
+  std::optional<OdometryIncrement> Drive(int left, int right) {
+    Skip(left, right);
+    return odometry_.Handle(Frame());
+  }
+  /// Drives for one period, without a frame.
+  void Skip(int left, int right) {
+    ticks_.time_ns += kPeriodNs;
+    ticks_.left = (ticks_.left + static_cast<std::uint64_t>(left)) & 0xFFFFU;
+    ticks_.right = (ticks_.right + static_cast<std::uint64_t>(right)) & 0xFFFFU;
+    ticks_.count = (ticks_.count + 1) & 0xFU;
+  }
+  [[nodiscard]] CanFrame Frame() const { return WheelTicksFrame(dbc_, ticks_); }
+  [[nodiscard]] MonotonicTime Now() const { return FromNanoseconds(ticks_.time_ns); }
+
+  DbcFile dbc_ = DbcFile::Parse(kWheelTicksDbc, "v.dbc").value();
+  WheelTicks ticks_{.left = 65500, .right = 100};
+  WheelOdometry odometry_ = WheelOdometry::Create(TicksConfig(), dbc_).value();
+};
+
+TEST_F(WheelOdometryTest, BeginsWithoutMotion) {
+  const auto first = Drive(0, 0);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->previous_time, first->time);
+  EXPECT_THAT(first->X_BiBj.Log(), IsNear(Eigen::Vector3d(Eigen::Vector3d::Zero()), 0.0));
+  EXPECT_EQ(first->flags, 0);
+}
+
+TEST_F(WheelOdometryTest, FollowsTheWheelsAcrossTheWrap) {
+  Drive(0, 0);
+  const auto second = Drive(50, 50);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->time - second->previous_time, Duration(kPeriodNs));
+  EXPECT_THAT(second->X_BiBj.Log(), IsNear(Eigen::Vector3d(0.05, 0.0, 0.0), 1e-12));
+  EXPECT_NEAR(second->speed_mps, 5.0, 1e-9);
+  ASSERT_TRUE(second->ticks);
+  EXPECT_THAT(*second->ticks, testing::ElementsAre(65550, 150));
+  EXPECT_EQ(second->flags, 0);
+  const auto third = Drive(-100 + 95, 5);  // turns left on the spot: 10 mm over 0.5 m
+  ASSERT_TRUE(third);
+  EXPECT_NEAR(third->X_BiBj.yaw(), 0.02, 1e-12);
+  EXPECT_NEAR(third->yaw_rate_radps, 2.0, 1e-9);
+  EXPECT_NEAR(third->X_OB.x(), 0.05, 1e-12);
+}
+
+TEST_F(WheelOdometryTest, ComposedIncrementsAreThePose) {
+  std::mt19937 engine(1);
+  Pose2 X_OB;
+  std::optional<OdometryIncrement> last;
+  for (int i = 0; i < 500; ++i) {
+    if (i % 50 == 49) {
+      for (int k = 0; k < 30; ++k)
+        Skip(10, 12);
+      odometry_.Tick(Now());
+    }
+    last = Drive(static_cast<int>(engine() % 40), static_cast<int>(engine() % 40));
+    ASSERT_TRUE(last);
+    EXPECT_TRUE(i == 0 || IsCovariance(last->covariance));
+    X_OB = i % 50 == 49 ? last->X_OB : X_OB * last->X_BiBj;
+    EXPECT_THAT((X_OB.Inverse() * last->X_OB).Log(),
+                IsNear(Eigen::Vector3d(Eigen::Vector3d::Zero()), 1e-9));
+  }
+}
+
+TEST_F(WheelOdometryTest, FlagsALostFrameAndKeepsItsTravel) {
+  Drive(0, 0);
+  const auto regular = Drive(10, 10);
+  Skip(10, 10);
+  const auto next = Drive(10, 10);
+  ASSERT_TRUE(regular && next);
+  EXPECT_EQ(next->flags, kOdometryGap);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.02, 1e-12);
+  EXPECT_GT(next->covariance(1, 1), 2.0 * regular->covariance(1, 1));
+}
+
+TEST_F(WheelOdometryTest, FlagsAFrameThatIsLate) {
+  Drive(0, 0);
+  for (int i = 0; i < 16; ++i)  // a whole round of the frame counter
+    Skip(1, 1);
+  const auto next = Drive(1, 1);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->flags, kOdometryGap);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.017, 1e-12);
+}
+
+TEST_F(WheelOdometryTest, FlagsARefusedChecksum) {
+  Drive(0, 0);
+  Skip(10, 10);
+  CanFrame broken = Frame();
+  broken.data[1] ^= 1U;
+  EXPECT_FALSE(odometry_.Handle(broken));
+  const auto next = Drive(10, 10);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->flags, kOdometryChecksum | kOdometryGap);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.02, 1e-12);
+}
+
+TEST_F(WheelOdometryTest, RefusesAJumpAndLosesNothing) {
+  Drive(0, 0);
+  const std::uint64_t left = ticks_.left;
+  Skip(10, 10);
+  ticks_.left = (left + 5000) & 0xFFFFU;  // 5 m in 10 ms
+  EXPECT_FALSE(odometry_.Handle(Frame()));
+  ticks_.left = (left + 10) & 0xFFFFU;
+  const auto next = Drive(10, 10);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->flags, kOdometryJump);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.02, 1e-12);
+  EXPECT_EQ(odometry_.counters().jumps, 1);
+}
+
+TEST_F(WheelOdometryTest, GoesOnAfterTheCountersWereSetAnew) {
+  Drive(0, 0);
+  Drive(10, 10);
+  const auto before = Drive(10, 10);
+  ticks_.left = 30000;
+  ticks_.right = 30000;
+  EXPECT_FALSE(Drive(10, 10));
+  const auto reset = Drive(10, 10);  // went on at 1 m/s for 20 ms, as far as one can know
+  ASSERT_TRUE(before && reset);
+  EXPECT_EQ(reset->flags, kOdometryJump);
+  EXPECT_NEAR(reset->X_BiBj.x(), 0.02, 1e-12);
+  EXPECT_GT(reset->covariance(2, 2), before->covariance(2, 2));
+  const auto after = Drive(10, 10);
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->flags, 0);
+  EXPECT_NEAR(after->X_BiBj.x(), 0.01, 1e-12);
+}
+
+TEST_F(WheelOdometryTest, FlagsStandstillAfterAWhile) {
+  Drive(0, 0);
+  Drive(10, 10);
+  std::optional<OdometryIncrement> increment;
+  for (int i = 0; i < 29; ++i)
+    increment = Drive(0, 0);
+  ASSERT_TRUE(increment);
+  EXPECT_EQ(increment->flags, 0);
+  increment = Drive(0, 0);
+  ASSERT_TRUE(increment);
+  EXPECT_EQ(increment->flags, kOdometryStandstill);
+  EXPECT_TRUE(IsCovariance(increment->covariance));
+  increment = Drive(1, 0);
+  ASSERT_TRUE(increment);
+  EXPECT_EQ(increment->flags, 0);
+}
+
+TEST_F(WheelOdometryTest, FlagsASpinningWheel) {
+  Drive(0, 0);
+  Drive(10, 10);
+  const auto regular = Drive(10, 10);
+  const auto slipping = Drive(10, 45);  // 35 mm in 10 ms over 0.5 m would be 7 rad/s, in 25 ms not
+  const auto spinning = Drive(10, 120);
+  ASSERT_TRUE(regular && slipping && spinning);
+  EXPECT_EQ(slipping->flags & kOdometrySlip, kOdometrySlip);  // 3.5 m/s faster within 10 ms
+  EXPECT_EQ(spinning->flags & kOdometrySlip, kOdometrySlip);
+  EXPECT_GT(spinning->covariance(2, 2), 10.0 * regular->covariance(2, 2));
+}
+
+TEST_F(WheelOdometryTest, RefusesTimesThatDoNotIncrease) {
+  Drive(0, 0);
+  ticks_.count = 9;
+  EXPECT_FALSE(odometry_.Handle(Frame()));
+  EXPECT_EQ(odometry_.counters().out_of_order, 1);
+}
+
+TEST_F(WheelOdometryTest, GuessesWhileNothingComesAndTakesTheErrorBack) {
+  Drive(0, 0);
+  Drive(10, 10);
+  EXPECT_FALSE(odometry_.Tick(Now() + std::chrono::milliseconds(150)));
+
+  // It stopped when the bus failed, which nobody knows: the guess goes on at 1 m/s, then stands.
+  const MonotonicTime lost = Now();
+  double variance = 0.0;
+  double guessed_m = 0.0;
+  for (int i = 1; i <= 15; ++i) {
+    const auto guess = odometry_.Tick(lost + std::chrono::milliseconds(100 * i + 101));
+    ASSERT_TRUE(guess);
+    EXPECT_EQ(guess->flags, kOdometryStale);
+    EXPECT_GT(guess->covariance(0, 0), variance);  // grows faster and faster
+    EXPECT_TRUE(IsCovariance(guess->covariance));
+    variance = guess->covariance(0, 0);
+    guessed_m = guess->X_OB.x() - 0.01;
+  }
+  EXPECT_NEAR(guessed_m, 0.5, 1e-9);
+  EXPECT_FALSE(odometry_.Tick(lost + std::chrono::milliseconds(1602)));  // not yet
+
+  for (int i = 0; i < 170; ++i)
+    Skip(0, 0);
+  const auto found = Drive(2, 2);
+  ASSERT_TRUE(found);
+  EXPECT_NE(found->flags & kOdometryGap, 0);
+  EXPECT_NEAR(found->X_OB.x(), 0.012, 1e-12);  // the counters know
+  EXPECT_NEAR(found->X_BiBj.x(), -0.498, 1e-9);
+  const double error_m = 0.498;
+  EXPECT_GT(found->covariance(0, 0), error_m * error_m / 9.0);  // within three sigma
+  const auto after = Drive(10, 10);
+  ASSERT_TRUE(after);
+  EXPECT_LT(after->covariance(0, 0), 1e-4);
+}
+
+TEST_F(WheelOdometryTest, TakesInFramesThatWaitedLongerThanTheGuess) {
+  Drive(0, 0);
+  Drive(10, 10);
+  const auto guess = odometry_.Tick(Now() + std::chrono::milliseconds(300));
+  ASSERT_TRUE(guess);
+  EXPECT_NEAR(guess->X_BiBj.x(), 0.3, 1e-9);
+  EXPECT_FALSE(Drive(10, 10));  // before the guess
+  for (int i = 0; i < 30; ++i)
+    Skip(10, 10);
+  const auto next = Drive(10, 10);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->previous_time, guess->time);
+  EXPECT_NEAR(next->X_OB.x(), 0.33, 1e-9);
+}
+
+TEST_F(WheelOdometryTest, DoesNotTrustCountersThatMayHaveGoneRound) {
+  Drive(0, 0);
+  for (int i = 0; i < 700; ++i)  // 7 s at up to 5 m/s are more than 32.767 m
+    Skip(1, 1);
+  const auto next = Drive(1, 1);
+  ASSERT_TRUE(next);
+  EXPECT_NE(next->flags & kOdometryGap, 0);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.0, 1e-12);
+  EXPECT_GT(std::sqrt(next->covariance(0, 0)), 5.0);
+}
+
+TEST_F(WheelOdometryTest, SurvivesHostileFrames) {
+  std::mt19937 engine(3);
+  for (int i = 0; i < 20000; ++i) {
+    Skip(static_cast<int>(engine() % 30), static_cast<int>(engine() % 30));
+    if (engine() % 10 == 0) ticks_.left = engine() % 65536;
+    if (engine() % 50 == 0) ticks_.time_ns += engine() % 3'000'000'000;
+    CanFrame frame = Frame();
+    if (engine() % 10 == 0) frame.size = static_cast<std::uint8_t>(engine() % 9);
+    if (engine() % 10 == 0) frame.data[engine() % 8] = static_cast<std::uint8_t>(engine());
+    for (const auto& increment : {odometry_.Handle(frame), odometry_.Tick(Now())}) {
+      if (!increment || increment->time == increment->previous_time) continue;
+      ASSERT_GT(increment->time, increment->previous_time);
+      ASSERT_TRUE(IsCovariance(increment->covariance)) << increment->covariance;
+      ASSERT_TRUE(increment->X_OB.Log().allFinite());
+    }
+  }
+  EXPECT_GT(odometry_.counters().jumps, 100);
+}
+
+constexpr const char* kSpeedsDbc =
+    "BO_ 1 SPEEDS: 8 X\n"
+    " SG_ RL : 0|16@1- (0.01,0) [0|0] \"m/s\" X\n"
+    " SG_ RR : 16|16@1- (0.01,0) [0|0] \"m/s\" X\n"
+    " SG_ FL : 32|16@1- (0.01,0) [0|0] \"m/s\" X\n"
+    " SG_ FR : 48|16@1- (0.01,0) [0|0] \"m/s\" X\n";
+
+class WheelSpeedOdometryTest : public testing::Test {
+ protected:
+  static OdometryConfig SpeedConfig() {
+    OdometryConfig config;
+    config.wheels.kind = "speed";
+    config.wheels.left_signal = "SPEEDS.RL";
+    config.wheels.right_signal = "SPEEDS.RR";
+    config.wheels.front_left_signal = "SPEEDS.FL";
+    config.wheels.front_right_signal = "SPEEDS.FR";
+    config.max_interval_s = 0.15;
+    return config;
+  }
+
+  std::optional<OdometryIncrement> Send(double time_s, double rear, double front) {
+    CanFrame frame;
+    frame.id.value = 1;
+    frame.size = 8;
+    frame.receive_time = MonotonicTime(FromSeconds(time_s));
+    for (const DbcSignal& signal : dbc_.messages()[0].signals) {
+      const double speed = signal.name[0] == 'R' ? rear : front;
+      EXPECT_TRUE(EncodeSignal(signal, speed, frame.payload()));
+    }
+    return odometry_.Handle(frame);
+  }
+
+  DbcFile dbc_ = DbcFile::Parse(kSpeedsDbc, "v.dbc").value();
+  WheelOdometry odometry_ = WheelOdometry::Create(SpeedConfig(), dbc_).value();
+};
+
+TEST_F(WheelSpeedOdometryTest, IntegratesSpeedsAsTrapezoids) {
+  Send(0.0, 1.0, 1.0);
+  const auto next = Send(0.1, 2.0, 2.0);
+  ASSERT_TRUE(next);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.15, 1e-12);
+  EXPECT_NEAR(next->speed_mps, 2.0, 1e-12);
+  EXPECT_FALSE(next->ticks);
+  EXPECT_EQ(next->flags, 0);
+}
+
+TEST_F(WheelSpeedOdometryTest, InflatesTheCovarianceOfAGap) {
+  Send(0.0, 1.0, 1.0);
+  const auto regular = Send(0.1, 1.0, 1.0);
+  const auto gap = Send(2.1, 1.0, 1.0);
+  ASSERT_TRUE(regular && gap);
+  EXPECT_EQ(gap->flags, kOdometryGap);
+  EXPECT_GT(std::sqrt(gap->covariance(0, 0)), 0.5);
+}
+
+TEST_F(WheelSpeedOdometryTest, RefusesAnImplausibleSpeed) {
+  Send(0.0, 1.0, 1.0);
+  EXPECT_FALSE(Send(0.1, 6.0, 6.0));
+  const auto next = Send(0.2, 1.0, 1.0);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->flags, kOdometryJump | kOdometryGap);
+  EXPECT_NEAR(next->X_BiBj.x(), 0.2, 1e-12);
+}
+
+TEST_F(WheelSpeedOdometryTest, FlagsAxlesThatContradictEachOther) {
+  Send(0.0, 3.0, 3.0);
+  const auto regular = Send(0.1, 3.0, 2.6);
+  const auto slipping = Send(0.2, 4.4, 2.5);
+  ASSERT_TRUE(regular && slipping);
+  EXPECT_EQ(regular->flags, 0);
+  EXPECT_EQ(slipping->flags, kOdometrySlip);
+}
+
+TEST_F(WheelSpeedOdometryTest, FlagsStandstillOfCreepingReadings) {
+  Send(0.0, 0.01, 0.0);
+  Send(0.1, 0.0, 0.0);
+  Send(0.2, -0.01, 0.0);
+  const auto still = Send(0.3, 0.01, 0.0);
+  ASSERT_TRUE(still);
+  EXPECT_EQ(still->flags, kOdometryStandstill);
+}
+
+TEST(OdometryConfigTest, AcceptsItsDefaultsAndNamesWhatIsWrong) {
+  const auto error_of = [](const auto& change) {
+    OdometryConfig config;
+    change(config);
+    const auto valid = config.Validate();
+    return valid ? "" : valid.error().message;
+  };
+  EXPECT_EQ(error_of([](OdometryConfig&) {}), "");
+  EXPECT_EQ(error_of([](OdometryConfig& config) { config.drive.track_m = 0.0; }),
+            "drive.track_m is 0, must be positive and finite");
+  EXPECT_EQ(error_of([](OdometryConfig& config) { config.wheels.kind = "x"; }),
+            "wheels.kind is 'x', must be one of ticks, speed");
+  EXPECT_EQ(error_of([](OdometryConfig& config) { config.stale_after_s = 0.01; }),
+            "stale_after_s is 0.01, must be at least max_interval_s, 0.05");
+  EXPECT_EQ(error_of([](OdometryConfig& config) { config.max_speed_mps = std::nan(""); }),
+            "max_speed_mps is nan, must be positive and finite");
+}
+
+TEST(WheelOdometryCreateTest, RefusesCountersThatAreTooNarrow) {
+  OdometryConfig config = TicksConfig();
+  config.max_speed_mps = 2000.0;
+  const auto odometry =
+      WheelOdometry::Create(config, DbcFile::Parse(kWheelTicksDbc, "v.dbc").value());
+  ASSERT_FALSE(odometry);
+  EXPECT_THAT(odometry.error().message, HasSubstr("max_speed_mps is 2000, must be less"));
+}
+
+}  // namespace
+}  // namespace relocd
