@@ -50,6 +50,7 @@ void CompletePaths(const std::filesystem::path& directory, Config& config) {
     CompletePath(directory, camera.file.dataset);
   CompletePath(directory, config.can.path);
   CompletePath(directory, config.can.dbc_file);
+  CompletePath(directory, config.inference.map_path);
   CompletePath(directory, config.recorder.directory);
 }
 
@@ -89,6 +90,7 @@ Result<void> Config::Validate() const {
   }
   if (auto ok = check("can", can); !ok) return ok;
   if (auto ok = check("odometry", odometry); !ok) return ok;
+  if (auto ok = check("inference", inference); !ok) return ok;
   if (auto ok = check("recorder", recorder); !ok) return ok;
   return check("supervisor", supervisor);
 }

@@ -9,6 +9,7 @@
 #include "core/result.h"
 #include "odometry/wheel_odometry.h"
 #include "recording/recorder_config.h"
+#include "relocalization/inference_config.h"
 #include "supervision/process_spec.h"
 
 namespace relocd {
@@ -33,6 +34,7 @@ struct Config {
   std::map<std::string, CameraConfig> cameras{{"front", CameraConfig()}};
   CanConfig can;
   OdometryConfig odometry;
+  InferenceConfig inference;
   RecorderConfig recorder;
   SupervisionConfig supervisor;
 
@@ -44,6 +46,7 @@ struct Config {
           "camerad: one for each camera, by a name of letters, digits and _.");
     visit("can", self.can, "odometryd: where the vehicle's CAN frames come from.");
     visit("odometry", self.odometry, "odometryd: how the wheels move the body.");
+    visit("inference", self.inference, "inferenced: how images become camera poses.");
     visit("recorder", self.recorder, "recorderd: what is kept of the messages.");
     visit("supervisor", self.supervisor, "relocd: the daemons it starts and watches.");
   }

@@ -1,0 +1,50 @@
+#include <utility>
+
+#include "daemon/daemon.h"
+#include "inferenced/inference_node.h"
+#include "relocalization/map_localizer.h"
+
+namespace relocd {
+namespace {
+
+class InferenceDaemon final : public Daemon {
+ public:
+  InferenceDaemon(DaemonContext& context, std::unique_ptr<ImageLocalizer> localizer)
+      : node_(context.config.inference,
+              std::move(localizer),
+              context.control_bus,
+              context.run_id,
+              ReadClocks) {
+    for (const auto& [camera, config] : context.config.cameras) {
+      context.image_bus->Subscribe<image_t>(
+          ImageChannel(camera), Delivery::kNewest, [this, name = camera](const image_t& image) {
+            node_.Handle(name, image);
+          });
+    }
+  }
+
+  NodeStatus Status(const ClockReading& now) override { return node_.Status(now); }
+
+ private:
+  InferenceNode node_;
+};
+
+Result<std::unique_ptr<Daemon>> MakeInference(DaemonContext& context) {
+  const InferenceConfig& config = context.config.inference;
+  auto localizer = MapLocalizer::Load(config.map_path, config.pose, config.threads);
+  if (!localizer) return std::move(localizer).error().WithContext("inference");
+  return std::unique_ptr<Daemon>(std::make_unique<InferenceDaemon>(context, std::move(*localizer)));
+}
+
+}  // namespace
+}  // namespace relocd
+
+int main(int argc, char** argv) {
+  return relocd::RunDaemon(argc,
+                           argv,
+                           {.name = "inferenced",
+                            .description = "Tells where the camera is on the map, image by image.",
+                            .uses_images = true,
+                            .instance_option = ""},
+                           relocd::MakeInference);
+}

@@ -1,0 +1,22 @@
+#include "relocalization/inference_config.h"
+
+#include <fmt/format.h>
+
+namespace relocd {
+
+Result<void> InferenceConfig::Validate() const {
+  if (threads < 1 || threads > 64) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("threads is {}, must be in [1, 64]", threads)};
+  }
+  if (max_image_age_ms < 1 || max_image_age_ms > 60000) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("max_image_age_ms is {}, must be in [1, 60000]", max_image_age_ms)};
+  }
+  if (auto ok = pose.Validate(); !ok) {
+    return Error{ErrorKind::kInvalidInput, "pose." + ok.error().message};
+  }
+  return {};
+}
+
+}  // namespace relocd

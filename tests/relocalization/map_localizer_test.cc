@@ -1,0 +1,143 @@
+#include "relocalization/map_localizer.h"
+
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "relocalization/inference_config.h"
+#include "relocalization/one_image_map.h"
+
+namespace relocd {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr int kWidth = 320;
+constexpr int kHeight = 240;
+
+CameraIntrinsics SmallCamera() {
+  CameraIntrinsics intrinsics{
+      .fx = 260.0, .fy = 262.0, .cx = 158.0, .cy = 121.0, .width = kWidth, .height = kHeight};
+  intrinsics.distortion = {-0.1, 0.01, 0.0005, -0.0003, 0.0};
+  return intrinsics;
+}
+
+const Pose3 kPose(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d(12.0, -7.0, 1.6));
+
+SceneMap MakeMap() {
+  return MakeOneImageMap(MakeTexturedImage(kWidth, kHeight, 1), SmallCamera(), kPose);
+}
+
+std::unique_ptr<MapLocalizer> MakeLocalizer(SceneMap map) {
+  return MapLocalizer::Create(std::move(map), {}, 1).value();
+}
+
+/// Time that goes on by one millisecond with each look at it.
+class TickingClock {
+ public:
+  MonotonicTime operator()() { return FromNanoseconds(1'000'000 * ++*looks_); }
+
+ private:
+  std::shared_ptr<std::int64_t> looks_ = std::make_shared<std::int64_t>(0);
+};
+
+TEST(MapLocalizerTest, FindsTheCameraOfTheImageThatTheMapKnows) {
+  const auto localizer = MakeLocalizer(MakeMap());
+  const auto localization =
+      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 1), 1, TickingClock());
+  ASSERT_TRUE(localization) << localization.error().message;
+  ASSERT_EQ(localization->pose.status, CameraPoseStatus::kOk);
+  EXPECT_EQ(localization->region, 0);
+  EXPECT_EQ(localization->pose.correspondences, 120);
+  const Vector6d error = (kPose.Inverse() * localization->pose.X_WC).Log();
+  EXPECT_LT(error.head<3>().norm(), 0.1);
+  EXPECT_LT(error.tail<3>().norm(), 0.01);
+}
+
+TEST(MapLocalizerTest, TimesItsStagesByTheClockThatItIsGiven) {
+  const auto localizer = MakeLocalizer(MakeMap());
+  const auto localization =
+      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 1), 1, TickingClock());
+  ASSERT_TRUE(localization);
+  EXPECT_EQ(localization->features_time, FromSeconds(1e-3));
+  EXPECT_EQ(localization->head_time, FromSeconds(1e-3));
+  EXPECT_EQ(localization->pose_time, FromSeconds(1e-3));
+}
+
+TEST(MapLocalizerTest, FindsNothingInAnotherImage) {
+  const auto localizer = MakeLocalizer(MakeMap());
+  const auto localization =
+      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 2), 1, TickingClock());
+  ASSERT_TRUE(localization);
+  EXPECT_NE(localization->pose.status, CameraPoseStatus::kOk);
+  EXPECT_EQ(localization->region, -1);
+}
+
+TEST(MapLocalizerTest, RefusesAnImageOfAnotherSize) {
+  const auto localizer = MakeLocalizer(MakeMap());
+  const auto localization = localizer->Localize(MakeTexturedImage(64, 48, 1), 1, TickingClock());
+  ASSERT_FALSE(localization);
+  EXPECT_EQ(localization.error().kind, ErrorKind::kInvalidInput);
+}
+
+TEST(MapLocalizerTest, TakesThePoseOfTheRegionThatExplainsTheImage) {
+  // Five regions of which the fourth knows the image; the others see every cell in one place.
+  SceneMap map = MakeMap();
+  const MapRegion knowing = map.regions.front();
+  MapRegion empty;
+  empty.head = MakeRandomHead(knowing.head.shape, 1);
+  map.regions = {empty, empty, empty, knowing, empty};
+  const auto localizer = MakeLocalizer(std::move(map));
+  const GrayImage image = MakeTexturedImage(kWidth, kHeight, 1);
+  const auto first = localizer->Localize(image, 1, TickingClock());
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->region, 3);
+  EXPECT_EQ(first->head_time, FromSeconds(5e-3)) << "all five are tried";
+
+  const auto second = localizer->Localize(image, 1, TickingClock());
+  EXPECT_EQ(second->region, 3);
+  EXPECT_EQ(second->head_time, FromSeconds(3e-3)) << "the one and its neighbours are tried";
+  EXPECT_EQ(second->pose.X_WC.translation(), first->pose.X_WC.translation());
+
+  ASSERT_TRUE(localizer->Localize(MakeTexturedImage(kWidth, kHeight, 2), 1, TickingClock()));
+  EXPECT_EQ(localizer->Localize(image, 1, TickingClock())->head_time, FromSeconds(5e-3))
+      << "all are tried again after a loss";
+}
+
+TEST(MapLocalizerTest, AppliesTheCalibrationOfTheRegion) {
+  SceneMap map = MakeMap();
+  map.regions.front().calibration.confidence_threshold = 1.0;
+  const auto localization =
+      MakeLocalizer(std::move(map))
+          ->Localize(MakeTexturedImage(kWidth, kHeight, 1), 1, TickingClock());
+  ASSERT_TRUE(localization);
+  EXPECT_EQ(localization->pose.status, CameraPoseStatus::kLowConfidence);
+}
+
+TEST(MapLocalizerTest, SaysWhichMapIsMissing) {
+  const auto none = MapLocalizer::Load("", {}, 1);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().kind, ErrorKind::kInvalidInput);
+  EXPECT_THAT(none.error().message, HasSubstr("map_path is empty, must name a map"));
+  const auto missing = MapLocalizer::Load("/nonexistent/site.relocmap", {}, 1);
+  ASSERT_FALSE(missing);
+  EXPECT_EQ(missing.error().kind, ErrorKind::kInvalidInput);
+  EXPECT_THAT(missing.error().message, HasSubstr("/nonexistent/site.relocmap"));
+}
+
+TEST(InferenceConfigTest, NamesTheFieldThatIsOutOfRange) {
+  EXPECT_TRUE(InferenceConfig().Validate());
+  InferenceConfig config;
+  config.threads = 0;
+  EXPECT_THAT(config.Validate().error().message, HasSubstr("threads is 0, must be in [1, 64]"));
+  config = {};
+  config.max_image_age_ms = 0;
+  EXPECT_THAT(config.Validate().error().message, HasSubstr("max_image_age_ms is 0, must be in"));
+  config = {};
+  config.pose.max_tries = 0;
+  EXPECT_THAT(config.Validate().error().message, HasSubstr("pose.max_tries is 0, must be in"));
+}
+
+}  // namespace
+}  // namespace relocd
