@@ -49,18 +49,6 @@ inline GrayImage MakeTexturedImage(int width, int height, std::uint64_t seed) {
   return image;
 }
 
-/// A random projection, which keeps distances well enough.
-inline FeatureWhitening MakeRandomWhitening(int inputs, int outputs) {
-  FeatureWhitening whitening{.inputs = inputs, .outputs = outputs, .mean = {}, .basis = {}};
-  whitening.mean.assign(static_cast<std::size_t>(inputs), 0.0F);
-  const CounterRandom random(7);
-  for (int i = 0; i < inputs * outputs; ++i) {
-    const auto bits = static_cast<double>(random.Bits(static_cast<std::uint64_t>(i)) >> 11U);
-    whitening.basis.push_back(static_cast<float>(bits / static_cast<double>(1ULL << 53U) - 0.5));
-  }
-  return whitening;
-}
-
 /// A network that is linear in its inputs: hidden units carry their positive and negative parts.
 inline Head MakeLinearHead(const Eigen::MatrixXd& weights, const Eigen::VectorXd& bias) {
   const auto inputs = static_cast<int>(weights.rows());
@@ -105,9 +93,11 @@ inline SceneMap MakeOneImageMap(const GrayImage& image,
   map.id = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
   const std::unique_ptr<GradientHistograms> extractor =
       GradientHistograms::Create(map.features).value();
-  map.whitening = MakeRandomWhitening(extractor->dimension(), kDimensions);
 
+  constexpr std::size_t kAllCells = 1'000'000;
   CellFeatures features;
+  RELOCD_CHECK(extractor->Extract(image, kAllCells, features), "the map's own image");
+  map.whitening = FitWhitening(features.values, extractor->dimension(), kDimensions).value();
   RELOCD_CHECK(extractor->Extract(image, map.cells_per_image, features), "the map's own image");
   std::vector<float> whitened(features.size() * kDimensions);
   map.whitening.Apply(features.values, whitened);
