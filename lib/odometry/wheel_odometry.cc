@@ -117,7 +117,9 @@ OdometryIncrement WheelOdometry::Begin(const WheelSample& sample) {
     anchor_->has_speeds = true;
   }
   time_ = sample.time;
-  return Publish(sample.time, {}, std::exchange(pending_flags_, 0));
+  // No time has passed; a covariance of zero would have no inverse.
+  const BodyMotion none = MotionFromTravel(config_.drive, {.duration_s = config_.max_interval_s});
+  return Publish(sample.time, none, std::exchange(pending_flags_, 0));
 }
 
 std::optional<OdometryIncrement> WheelOdometry::Accept(const WheelSample& sample,

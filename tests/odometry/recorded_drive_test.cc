@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -85,6 +86,9 @@ TEST_F(RecordedDriveTest, DecodesEveryWheelSpeedAsTheReferenceDid) {
       ASSERT_NEAR(six_decimals(decoded[i]), *expected, 1e-9) << reference->Where(row);
     }
   }
+  fmt::print("{} of {} rows of wheel speeds equal the reference's\n",
+             samples_.size(),
+             reference->row_count());
 }
 
 TEST_F(RecordedDriveTest, TravelsTheDistanceWithinOneAndAHalfPercent) {
@@ -92,6 +96,10 @@ TEST_F(RecordedDriveTest, TravelsTheDistanceWithinOneAndAHalfPercent) {
   for (const OdometryIncrement& increment : increments_)
     distance_m += increment.X_BiBj.translation().norm();
   constexpr double kTruth = 1010.8;
+  fmt::print("travelled {:.1f} m of {:.1f} m: {:+.2f} %\n",
+             distance_m,
+             kTruth,
+             100.0 * (distance_m / kTruth - 1.0));
   EXPECT_NEAR(distance_m, kTruth, 0.015 * kTruth);
 }
 
