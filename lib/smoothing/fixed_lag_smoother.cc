@@ -1,0 +1,544 @@
+#include "smoothing/fixed_lag_smoother.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "geometry/angle.h"
+#include "geometry/covariance.h"
+#include "smoothing/motion_covariance.h"
+
+namespace relocd {
+namespace {
+
+/// Iterations after a start or a relocalisation, when the estimates are far from the minimum.
+constexpr int kStartIterations = 15;
+/// Proposals grow with the square of the fixes: so many are looked at for a start.
+constexpr std::size_t kMostStartFixes = 60;
+/// Positions without heading need more than this many to say how the frames are turned.
+constexpr int kFewestPositions = 8;
+/// A start whose heading is less certain than this would begin on the wrong side.
+constexpr double kStartHeadingSigma = 0.5;
+/// Fewer recent fixes than this overrule nothing.
+constexpr std::size_t kFewestVoters = 8;
+/// Whether the fixes contradict the estimate is seen from the last so many.
+constexpr std::size_t kLostVoters = 10;
+constexpr double kLostShare = 0.2;
+/// Below these a body that stands is not more certain: the minimum keeps the matrix regular.
+const Eigen::Vector3d kLeastSigmas(1e-3, 1e-3, 1e-4);
+/// Variance of an angle of which nothing is known.
+constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
+/// Motion of a keyframe's first instant: its covariance must be positive definite.
+constexpr double kLeastVariance = 1e-10;
+/// Least distance and turn that make a body "moving" for the keyframes by time.
+constexpr double kStandstill = 0.02;
+
+bool IsUsable(const Pose2& pose) {
+  return pose.translation().allFinite() && std::isfinite(pose.yaw());
+}
+
+/// Sane values only: a variance of 1e308 is finite, and its square is not.
+bool IsUsableCovariance(const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
+  constexpr double kLargest = 1e10;
+  constexpr double kSmallest = 1e-12;
+  return IsCovariance(covariance) && covariance.diagonal().maxCoeff() < kLargest &&
+         covariance.diagonal().minCoeff() > kSmallest;
+}
+
+bool IsUsable(const Fix& fix) {
+  if (fix.has_heading) return IsUsable(fix.X_WB) && IsUsableCovariance(fix.covariance);
+  return fix.X_WB.translation().allFinite() &&
+         IsUsableCovariance(fix.covariance.topLeftCorner<2, 2>());
+}
+
+double LargestPositionSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::Matrix2d position = covariance.topLeftCorner<2, 2>();
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position).eigenvalues().y());
+}
+
+/// At most `count` of them, evenly taken.
+std::vector<ConsensusFix> Thin(const std::vector<ConsensusFix>& fixes, std::size_t count) {
+  if (fixes.size() <= count) return fixes;
+  std::vector<ConsensusFix> thinned;
+  thinned.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    thinned.push_back(fixes[i * (fixes.size() - 1) / (count - 1)]);
+  }
+  return thinned;
+}
+
+}  // namespace
+
+const char* ToString(SmootherStatus status) {
+  switch (status) {
+    case SmootherStatus::kUninitialised:
+      return "uninitialised";
+    case SmootherStatus::kConverging:
+      return "converging";
+    case SmootherStatus::kOk:
+      return "ok";
+    case SmootherStatus::kDeadReckoning:
+      return "dead_reckoning";
+    case SmootherStatus::kLost:
+      return "lost";
+  }
+  return "unknown";
+}
+
+bool IsCertain(const Eigen::Matrix3d& covariance, const SmootherConfig& config) {
+  return LargestPositionSigma(covariance) <= config.ok_sigma_m &&
+         std::sqrt(covariance(2, 2)) <= config.ok_heading_sigma_rad;
+}
+
+FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
+    : config_(config),
+      weighting_(config.cauchy_scale_sigmas, config.fix_correlation_time_s),
+      consensus_options_{.radius_sigmas = config.relocalization_radius_sigmas,
+                         .min_radius_m = config.relocalization_min_radius_m},
+      history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)) {}
+
+Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
+  if (!IsUsable(prior.X_WB) || !IsUsableCovariance(prior.covariance)) {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format("resetting the pose: x {} m, y {} m, yaw {} rad or their covariance is "
+                    "not usable, must be finite and positive definite",
+                    prior.X_WB.x(),
+                    prior.X_WB.y(),
+                    prior.X_WB.yaw())};
+  }
+  is_started_ = true;
+  unstarted_fix_.reset();
+  window_.fixes.clear();
+  voters_.clear();
+  window_.last_removed_fix.reset();
+  supports_since_start_ = 0;
+  window_.prior = prior;
+  newest_covariance_ = prior.covariance;
+  if (window_.keyframes.empty()) return {};
+  // A keyframe where the body is now: the prior is about this moment.
+  OdometrySample sample = history_.newest();
+  if (sample.X_KB.translation() != Eigen::Vector2d::Zero() || sample.X_KB.yaw() != 0.0) {
+    sample.time += Duration(1);
+    AddKeyframe(sample);
+    history_.Push(sample);
+  }
+  while (window_.keyframes.size() > 1)
+    RemoveOldest();
+  window_.prior = prior;
+  window_.keyframes.front().SetX_WK(prior.X_WB);
+  newest_covariance_ = prior.covariance;
+  return {};
+}
+
+Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
+  if (history_.empty()) {
+    Begin(step.time);
+    return {};
+  }
+  if (step.time <= history_.newest().time) {
+    ++counters_.odometry_refused;
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("odometry time is {} ns, must be above the one before's {} ns",
+                             ToNanoseconds(step.time),
+                             ToNanoseconds(history_.newest().time))};
+  }
+  Eigen::Matrix3d covariance = config_.odometry_covariance_factor * step.covariance;
+  covariance.diagonal().array() += kLeastVariance;
+  if (!IsUsable(step.X_BprevB) || !IsUsableCovariance(covariance)) {
+    ++counters_.odometry_refused;
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("odometry motion x {} m, y {} m, yaw {} rad or its covariance is not "
+                             "usable, must be finite and positive definite",
+                             step.X_BprevB.x(),
+                             step.X_BprevB.y(),
+                             step.X_BprevB.yaw())};
+  }
+  OdometrySample sample = history_.newest();
+  sample.time = step.time;
+  sample.X_OB = sample.X_OB * step.X_BprevB;
+  sample.X_KB = sample.X_KB * step.X_BprevB;
+  sample.covariance_KB = ComposeCovariance(sample.covariance_KB, step.X_BprevB, covariance);
+  sample.step_covariance = covariance;
+  odometer_m_ += step.X_BprevB.translation().norm();
+
+  const double distance = sample.X_KB.translation().norm();
+  const double turn = std::abs(sample.X_KB.yaw());
+  const bool moves = distance > kStandstill || turn > kStandstill;
+  const Duration age = sample.time - window_.keyframes.back().time;
+  if (distance >= config_.keyframe_distance_m || turn >= config_.keyframe_angle_rad ||
+      (moves && age >= FromSeconds(config_.keyframe_interval_s))) {
+    AddKeyframe(sample);
+  }
+  history_.Push(sample);
+  ReattachExtrapolated();
+  return {};
+}
+
+void FixedLagSmoother::Begin(MonotonicTime time) {
+  Keyframe keyframe;
+  keyframe.time = time;
+  if (window_.prior) keyframe.SetX_WK(window_.prior->X_WB);
+  window_.keyframes.push_back(std::move(keyframe));
+  OdometrySample sample;
+  sample.time = time;
+  history_.Push(sample);
+}
+
+void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
+  const Keyframe& before = window_.keyframes.back();
+  Keyframe keyframe;
+  keyframe.id = before.id + 1;
+  keyframe.time = sample.time;
+  keyframe.generation = before.generation;
+  keyframe.X_OB = sample.X_OB;
+  keyframe.X_PK = sample.X_KB;
+  keyframe.covariance_PK = sample.covariance_KB;
+  keyframe.SetX_WK(before.X_WK() * sample.X_KB);
+  keyframe.motion_residual = MakeMotionResidual(keyframe);
+  newest_covariance_ = ComposeCovariance(newest_covariance_, sample.X_KB, sample.covariance_KB);
+  window_.keyframes.push_back(std::move(keyframe));
+
+  sample.keyframe_id = window_.keyframes.back().id;
+  sample.X_KB = Pose2();
+  sample.covariance_KB.setZero();
+  while (window_.keyframes.size() > static_cast<std::size_t>(config_.window_keyframes)) {
+    RemoveOldest();
+  }
+}
+
+void FixedLagSmoother::RemoveOldest() {
+  const bool had_prior = window_.prior.has_value();
+  RemovedKeyframe removed = MarginalizeOldest(window_, weighting_);
+  // Before the start the estimates mean nothing, and so would a prior from them.
+  if (!is_started_ && !had_prior) window_.prior.reset();
+  if (on_leave_) on_leave_(std::move(removed));
+}
+
+void FixedLagSmoother::ReattachExtrapolated() {
+  for (auto fix = window_.fixes.rbegin(); fix != window_.fixes.rend(); ++fix) {
+    if (!fix->is_extrapolated || fix->fix.time > history_.newest().time) continue;
+    const auto sample = history_.At(fix->fix.time);
+    if (!sample || !window_.Has(sample->keyframe_id)) continue;
+    const bool is_gated = fix->is_gated;
+    *fix = Attach(fix->fix, *sample);
+    fix->is_gated = is_gated;
+  }
+}
+
+AttachedFix FixedLagSmoother::Attach(const Fix& fix, const OdometrySample& sample) const {
+  AttachedFix attached;
+  attached.fix = fix;
+  attached.keyframe_id = sample.keyframe_id;
+  attached.X_KF = sample.X_KB;
+  attached.covariance_KF = sample.covariance_KB;
+  attached.is_extrapolated = sample.is_extrapolated;
+  attached.residual = MakeFixResidual(attached);
+  return attached;
+}
+
+void FixedLagSmoother::Insert(AttachedFix fix) {
+  const auto after = std::upper_bound(
+      window_.fixes.begin(),
+      window_.fixes.end(),
+      fix.fix.time,
+      [](MonotonicTime time, const AttachedFix& other) { return time < other.fix.time; });
+  window_.fixes.insert(after, std::move(fix));
+}
+
+bool FixedLagSmoother::IsFull(std::int64_t keyframe_id) const {
+  const auto count =
+      std::count_if(window_.fixes.begin(), window_.fixes.end(), [&](const AttachedFix& fix) {
+        return fix.keyframe_id == keyframe_id && !fix.is_gated;
+      });
+  return count >= config_.max_fixes_per_keyframe;
+}
+
+bool FixedLagSmoother::PassesGate(const AttachedFix& fix) const {
+  const Pose2 X_WF = window_.X_WF(fix);
+  const Pose2& X_WM = fix.fix.X_WB;
+  const Eigen::Matrix3d predicted =
+      ComposeCovariance(newest_covariance_, fix.X_KF, fix.covariance_KF);
+  const Eigen::Matrix2d R_WF = Eigen::Rotation2Dd(X_WF.yaw()).toRotationMatrix();
+  const Eigen::Vector2d error_W = X_WM.translation() - X_WF.translation();
+  if (!fix.fix.has_heading) {
+    const Eigen::Matrix2d innovation = R_WF * predicted.topLeftCorner<2, 2>() * R_WF.transpose() +
+                                       fix.fix.covariance.topLeftCorner<2, 2>();
+    return SquaredMahalanobis(error_W, innovation) <= config_.gate_squared_mahalanobis;
+  }
+  // Both along F's axes: they differ from the measured ones by the heading's error.
+  Eigen::Vector3d error;
+  error << R_WF.transpose() * error_W, WrapAngle(X_WM.yaw() - X_WF.yaw());
+  const Eigen::Matrix3d innovation = predicted + fix.fix.covariance;
+  return SquaredMahalanobis(error, innovation) <= config_.gate_squared_mahalanobis;
+}
+
+FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
+  if (!IsUsable(fix)) {
+    ++counters_.fixes_invalid;
+    return FixOutcome::kInvalid;
+  }
+  if (history_.empty()) {
+    ++counters_.fixes_ahead;
+    return FixOutcome::kAhead;
+  }
+  const auto sample = history_.At(fix.time);
+  if (!sample) {
+    const bool is_ahead = fix.time > history_.newest().time;
+    ++(is_ahead ? counters_.fixes_ahead : counters_.fixes_late);
+    return is_ahead ? FixOutcome::kAhead : FixOutcome::kLate;
+  }
+  if (!window_.Has(sample->keyframe_id)) {
+    ++counters_.fixes_late;
+    return FixOutcome::kLate;
+  }
+  Remember(fix, *sample);
+  AttachedFix attached = Attach(fix, *sample);
+  if (!is_started_) {
+    if (!unstarted_fix_ || fix.time > unstarted_fix_->time) unstarted_fix_ = fix;
+    if (!IsFull(sample->keyframe_id)) Insert(std::move(attached));
+    ++counters_.fixes_accepted;
+    NoteSupport(*sample);
+    TryStart();
+    return FixOutcome::kAccepted;
+  }
+
+  attached.is_gated = !PassesGate(attached);
+  const FixOutcome outcome = attached.is_gated             ? FixOutcome::kGated
+                             : IsFull(sample->keyframe_id) ? FixOutcome::kRedundant
+                                                           : FixOutcome::kAccepted;
+  if (outcome != FixOutcome::kGated) NoteSupport(*sample);
+  if (outcome == FixOutcome::kAccepted) {
+    ++counters_.fixes_accepted;
+    Insert(std::move(attached));
+    SolveWindow(config_.max_iterations);
+  } else if (outcome == FixOutcome::kGated) {
+    ++counters_.fixes_gated;
+    Insert(std::move(attached));
+  } else {
+    ++counters_.fixes_redundant;
+  }
+  TryRelocalize();
+  return outcome;
+}
+
+void FixedLagSmoother::NoteSupport(const OdometrySample& sample) {
+  if (!last_support_ || sample.time > *last_support_) {
+    last_support_ = sample.time;
+    odometer_at_fix_m_ = odometer_m_;
+  }
+  ++supports_since_start_;
+}
+
+void FixedLagSmoother::Remember(const Fix& fix, const OdometrySample& sample) {
+  const auto after = std::upper_bound(
+      voters_.begin(), voters_.end(), fix.time, [](MonotonicTime time, const Voter& voter) {
+        return time < voter.time;
+      });
+  const Duration spacing = FromSeconds(config_.relocalization_spacing_s);
+  if (after != voters_.begin() && fix.time - std::prev(after)->time < spacing) return;
+  if (after != voters_.end() && after->time - fix.time < spacing) return;
+  Voter voter;
+  voter.time = fix.time;
+  voter.keyframe_id = sample.keyframe_id;
+  voter.X_KF = sample.X_KB;
+  voter.fix = ToConsensusFix(fix, sample.X_OB);
+  voters_.insert(after, voter);
+  if (voters_.size() > static_cast<std::size_t>(config_.relocalization_window)) {
+    voters_.erase(voters_.begin());
+  }
+}
+
+Pose2 FixedLagSmoother::X_WO() const {
+  const Keyframe& newest = window_.keyframes.back();
+  return newest.X_WK() * newest.X_OB.Inverse();
+}
+
+void FixedLagSmoother::TryStart() {
+  std::vector<ConsensusFix> fixes;
+  for (const AttachedFix& fix : window_.fixes)
+    fixes.push_back(ToConsensusFix(fix.fix, X_OF(fix)));
+  const auto with_heading = std::count_if(
+      fixes.begin(), fixes.end(), [](const ConsensusFix& fix) { return fix.has_heading; });
+  const int fewest = with_heading >= config_.start_fixes
+                         ? config_.start_fixes
+                         : std::max(config_.start_fixes, kFewestPositions);
+  if (static_cast<int>(fixes.size()) < fewest) return;
+  fixes = Thin(fixes, kMostStartFixes);
+  const auto consensus = FindConsensus(fixes, consensus_options_);
+  const double share = config_.start_inlier_share * static_cast<double>(fixes.size());
+  if (!consensus || consensus->supporters < std::max(static_cast<double>(fewest), share) ||
+      consensus->heading_sigma_rad > kStartHeadingSigma) {
+    return;
+  }
+  is_started_ = true;
+  supports_since_start_ = consensus->supporters;
+  Reseed(consensus->X_WO);
+}
+
+void FixedLagSmoother::Reseed(const Pose2& X_WO) {
+  for (Keyframe& keyframe : window_.keyframes) {
+    keyframe.SetX_WK(X_WO * keyframe.X_OB);
+    keyframe.generation = counters_.relocalizations + 1;
+  }
+  for (AttachedFix& fix : window_.fixes)
+    fix.is_gated = false;
+  window_.prior.reset();
+  window_.last_removed_fix.reset();
+  SolveWindow(kStartIterations);
+}
+
+std::vector<ConsensusFix> FixedLagSmoother::VotersAsConsensus() const {
+  std::vector<ConsensusFix> fixes;
+  fixes.reserve(voters_.size());
+  for (const Voter& voter : voters_)
+    fixes.push_back(voter.fix);
+  return fixes;
+}
+
+bool FixedLagSmoother::IsSupported(const Voter& voter) const {
+  const Pose2 X_WB = window_.Has(voter.keyframe_id)
+                         ? window_.Get(voter.keyframe_id).X_WK() * voter.X_KF
+                         : X_WO() * voter.fix.X_OB;
+  return Supports(voter.fix, X_WB, consensus_options_);
+}
+
+bool FixedLagSmoother::TryRelocalize() {
+  if (voters_.size() < kFewestVoters) return false;
+  const auto supported = static_cast<int>(std::count_if(
+      voters_.begin(), voters_.end(), [this](const Voter& voter) { return IsSupported(voter); }));
+  // Another pose must have far more support than this one. The numbers are those with which a
+  // carried robot was found again within 32 fixes, and none that was not carried was moved.
+  const int needed = std::max(3 * supported + 8,
+                              static_cast<int>(std::ceil(config_.relocalization_inlier_share *
+                                                         static_cast<double>(voters_.size()))));
+  if (static_cast<int>(voters_.size()) < needed) return false;
+  const std::vector<ConsensusFix> fixes = VotersAsConsensus();
+  const auto consensus = FindConsensus(fixes, consensus_options_);
+  if (!consensus || consensus->supporters < needed) return false;
+  ++counters_.relocalizations;
+  supports_since_start_ = consensus->supporters;
+  Relocalize(consensus->X_WO, fixes);
+  return true;
+}
+
+Pose2 FixedLagSmoother::X_OF(const AttachedFix& fix) const {
+  return window_.Get(fix.keyframe_id).X_OB * fix.X_KF;
+}
+
+int FixedLagSmoother::SupportersInWindow(const std::optional<Pose2>& X_WO) const {
+  return static_cast<int>(
+      std::count_if(window_.fixes.begin(), window_.fixes.end(), [&](const AttachedFix& attached) {
+        const ConsensusFix fix = ToConsensusFix(attached.fix, X_OF(attached));
+        return Supports(fix, X_WO ? *X_WO * fix.X_OB : window_.X_WF(attached), consensus_options_);
+      }));
+}
+
+void FixedLagSmoother::Relocalize(const Pose2& X_WO, std::span<const ConsensusFix> voters) {
+  // Either the window was wrong from its start, and all of it moves; or the body was carried, and
+  // what was before the first fix at the new place is right but over.
+  if (SupportersInWindow(X_WO) < SupportersInWindow(std::nullopt)) {
+    int balance = 0;
+    int best_balance = 0;
+    std::size_t first = voters.size() - 1;
+    for (std::size_t i = voters.size(); i-- > 0;) {
+      balance += Supports(voters[i], X_WO * voters[i].X_OB, consensus_options_) ? 1 : -1;
+      if (balance <= best_balance) continue;
+      best_balance = balance;
+      first = i;
+    }
+    CutBefore(voters_[first].keyframe_id);
+  }
+  Reseed(X_WO);
+}
+
+void FixedLagSmoother::CutBefore(std::int64_t keyframe_id) {
+  while (window_.keyframes.size() > 1 && window_.keyframes.front().id < keyframe_id)
+    RemoveOldest();
+  window_.keyframes.front().is_cut = true;
+  std::erase_if(voters_, [&](const Voter& voter) { return voter.keyframe_id < keyframe_id; });
+}
+
+void FixedLagSmoother::SolveWindow(int max_iterations) {
+  const bool solved = Solve(window_, weighting_, max_iterations);
+  const Eigen::Matrix3d covariance =
+      NewestCovariance(window_, weighting_.WithMisfit(EstimateMisfit(window_, weighting_)));
+  if (solved && IsCovariance(covariance)) {
+    newest_covariance_ = covariance;
+    return;
+  }
+  ++counters_.solver_failures;
+  RestartAtNewest();
+}
+
+void FixedLagSmoother::RestartAtNewest() {
+  Keyframe newest = std::move(window_.keyframes.back());
+  constexpr double kDoubt = 4.0;
+  newest_covariance_ *= kDoubt;
+  newest_covariance_.diagonal() += kLeastSigmas.cwiseAbs2();
+  if (!IsCovariance(newest_covariance_)) newest_covariance_ = Eigen::Matrix3d::Identity();
+  window_ = KeyframeWindow();
+  window_.prior = PlanarPose{.X_WB = newest.X_WK(), .covariance = newest_covariance_};
+  window_.keyframes.push_back(std::move(newest));
+}
+
+SmootherEstimate FixedLagSmoother::Estimate() const {
+  if (history_.empty()) return {};
+  return EstimateAt(history_.newest().time).value_or(SmootherEstimate());
+}
+
+std::optional<SmootherEstimate> FixedLagSmoother::EstimateAt(MonotonicTime time) const {
+  const auto sample = history_.At(time);
+  if (!sample || !window_.Has(sample->keyframe_id)) return std::nullopt;
+  SmootherEstimate estimate;
+  estimate.time = time;
+  if (last_support_) {
+    estimate.time_since_fix_s = std::max(0.0, ToSeconds(time - *last_support_));
+    estimate.distance_since_fix_m = odometer_m_ - odometer_at_fix_m_;
+  }
+  if (!is_started_) {
+    if (!unstarted_fix_) return estimate;
+    // The way since then is known, its direction is not.
+    const double way = estimate.distance_since_fix_m;
+    estimate.has_pose = true;
+    estimate.X_WB = {unstarted_fix_->X_WB.x(), unstarted_fix_->X_WB.y(), 0.0};
+    estimate.covariance.setZero();
+    estimate.covariance.topLeftCorner<2, 2>() =
+        unstarted_fix_->covariance.topLeftCorner<2, 2>() + way * way * Eigen::Matrix2d::Identity();
+    estimate.covariance(2, 2) = kUnknownYawVariance;
+    return estimate;
+  }
+  estimate.has_pose = true;
+  estimate.X_WB = window_.Get(sample->keyframe_id).X_WK() * sample->X_KB;
+  estimate.covariance = ComposeCovariance(newest_covariance_, sample->X_KB, sample->covariance_KB);
+  estimate.covariance.diagonal() += kLeastSigmas.cwiseAbs2();
+  estimate.status = Status(estimate.covariance, time);
+  return estimate;
+}
+
+SmootherStatus FixedLagSmoother::Status(const Eigen::Matrix3d& covariance,
+                                        MonotonicTime now) const {
+  const std::size_t recent = std::min(voters_.size(), kLostVoters);
+  const auto supported = std::count_if(voters_.end() - static_cast<std::ptrdiff_t>(recent),
+                                       voters_.end(),
+                                       [this](const Voter& voter) { return IsSupported(voter); });
+  if (recent >= kLostVoters / 2 &&
+      static_cast<double>(supported) <= kLostShare * static_cast<double>(recent)) {
+    return SmootherStatus::kLost;
+  }
+  if (!last_support_ || ToSeconds(now - *last_support_) > config_.dead_reckoning_after_s) {
+    return SmootherStatus::kDeadReckoning;
+  }
+  if (supports_since_start_ < config_.ok_fixes || !IsCertain(covariance, config_)) {
+    return SmootherStatus::kConverging;
+  }
+  return SmootherStatus::kOk;
+}
+
+}  // namespace relocd
