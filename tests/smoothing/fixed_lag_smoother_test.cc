@@ -1,0 +1,360 @@
+#include "smoothing/fixed_lag_smoother.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <iostream>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "geometry/covariance.h"
+#include "smoothing/offline_smoother.h"
+#include "smoothing/simulated_drive.h"
+#include "support/error_statistics.h"
+
+namespace relocd {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr unsigned kSeeds = 6;
+
+double PositionError(const Pose2& X_WB, const Pose2& truth) {
+  return (X_WB.translation() - truth.translation()).norm();
+}
+
+/// Feeds odometry up to each fix's time and then the fix, `delay` fixes late.
+SmootherEstimate Drive(const SimulatedDrive& drive,
+                       FixedLagSmoother& smoother,
+                       std::size_t delay = 0) {
+  std::size_t step = 0;
+  for (std::size_t i = 0; i < drive.log.fixes.size(); ++i) {
+    const MonotonicTime now = drive.log.fixes[i].time;
+    for (; step < drive.log.odometry.size() && drive.log.odometry[step].time <= now; ++step) {
+      EXPECT_TRUE(smoother.AddOdometry(drive.log.odometry[step]));
+    }
+    if (i >= delay) smoother.AddFix(drive.log.fixes[i - delay]);
+  }
+  for (std::size_t i = drive.log.fixes.size() - delay; i < drive.log.fixes.size(); ++i) {
+    smoother.AddFix(drive.log.fixes[i]);
+  }
+  for (; step < drive.log.odometry.size(); ++step) {
+    EXPECT_TRUE(smoother.AddOdometry(drive.log.odometry[step]));
+  }
+  return smoother.Estimate();
+}
+
+TEST(FixedLagSmootherTest, ReportsACovarianceThatTheTruthLiesIn) {
+  for (const bool has_heading : {true, false}) {
+    int inside = 0;
+    int count = 0;
+    double nees = 0.0;
+    for (unsigned seed = 0; seed < 10; ++seed) {
+      const auto drive =
+          DriveSimulator({.duration_s = 160.0, .has_heading = has_heading}, seed).Run();
+      const auto estimates = SmoothCausally(drive.log, ConfigForIndependentErrors());
+      for (std::size_t i = 50; i < estimates.size(); ++i) {
+        const Eigen::Vector3d error = (estimates[i].X_WB.Inverse() * drive.truth_at_fixes[i]).Log();
+        const auto& covariance = estimates[i].covariance;
+        ++count;
+        nees += SquaredMahalanobis(error, covariance) / 3.0;
+        const double position =
+            SquaredMahalanobis(error.head<2>(), covariance.topLeftCorner<2, 2>());
+        if (position <= kChiSquared95Dof2) ++inside;
+      }
+    }
+    const double share = static_cast<double>(inside) / count;
+    std::cout << (has_heading ? "poses" : "positions") << ": truth in the 95 % ellipse "
+              << 100.0 * share << " %, NEES per degree of freedom " << nees / count << '\n';
+    EXPECT_GT(share, 0.90);
+    EXPECT_LT(share, 0.985);
+    EXPECT_GT(nees / count, 0.5);
+    EXPECT_LT(nees / count, 1.3);
+  }
+}
+
+TEST(FixedLagSmootherTest, BeatsTheFixes) {
+  std::vector<double> errors;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    const auto drive = DriveSimulator({}, seed).Run();
+    FixedLagSmoother smoother{SmootherConfig()};
+    const SmootherEstimate estimate = Drive(drive, smoother);
+    EXPECT_EQ(estimate.status, SmootherStatus::kOk);
+    EXPECT_EQ(smoother.counters().relocalizations, 0);
+    errors.push_back(PositionError(estimate.X_WB, drive.X_WB_end));
+  }
+  EXPECT_LT(Summarize(errors).rmse, 0.25);  // a fix alone: 0.42
+}
+
+TEST(FixedLagSmootherTest, HalfOfTheFixesBeingWrongDoesNotMoveIt) {
+  for (const bool has_heading : {true, false}) {
+    std::vector<double> errors;
+    for (unsigned seed = 0; seed < kSeeds; ++seed) {
+      const auto drive =
+          DriveSimulator({.outlier_share = 0.5, .has_heading = has_heading}, seed).Run();
+      FixedLagSmoother smoother{SmootherConfig()};
+      const SmootherEstimate estimate = Drive(drive, smoother);
+      EXPECT_EQ(smoother.counters().relocalizations, 0) << seed;
+      EXPECT_GT(smoother.counters().fixes_gated, 20) << seed;
+      errors.push_back(PositionError(estimate.X_WB, drive.X_WB_end));
+    }
+    EXPECT_LT(Summarize(errors).rmse, 0.4) << has_heading;
+    EXPECT_LT(Summarize(errors).max, 1.0) << has_heading;
+  }
+}
+
+TEST(FixedLagSmootherTest, IsAtTheMinimumOfItsWindow) {
+  const auto drive = DriveSimulator({.outlier_share = 0.2}, 1).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  const Pose2 X_WB = Drive(drive, smoother).X_WB;
+  const Pose2 X_KB = smoother.window().keyframes.back().X_WK().Inverse() * X_WB;
+  const FixWeighting weighting = smoother.weighting();
+  KeyframeWindow window = std::move(smoother).TakeWindow();
+  ASSERT_TRUE(Solve(window, weighting, 200));
+  EXPECT_LT(PositionError(window.keyframes.back().X_WK() * X_KB, X_WB), 0.03);
+}
+
+TEST(FixedLagSmootherTest, AShortWindowAgreesWithTheWholeDrive) {
+  const auto drive = DriveSimulator({.duration_s = 240.0}, 2).Run();
+  SmootherConfig config = ConfigForIndependentErrors();
+  FixedLagSmoother whole(config);
+  config.window_keyframes = 200;
+  FixedLagSmoother shortened(config);
+  const SmootherEstimate expected = Drive(drive, whole);
+  const SmootherEstimate estimate = Drive(drive, shortened);
+  EXPECT_EQ(shortened.window().keyframes.size(), 200U);
+  EXPECT_LT(PositionError(estimate.X_WB, expected.X_WB), 0.05);
+}
+
+TEST(FixedLagSmootherTest, LateFixesGiveWhatFixesInOrderGive) {
+  const auto drive = DriveSimulator({}, 3).Run();
+  FixedLagSmoother in_order{SmootherConfig()};
+  FixedLagSmoother late{SmootherConfig()};
+  const SmootherEstimate expected = Drive(drive, in_order);
+  const SmootherEstimate estimate = Drive(drive, late, 5);
+  EXPECT_LT(PositionError(estimate.X_WB, expected.X_WB), 5e-3);
+  EXPECT_NEAR(estimate.X_WB.yaw(), expected.X_WB.yaw(), 1e-3);
+}
+
+TEST(FixedLagSmootherTest, SwappedFixesGiveWhatFixesInOrderGive) {
+  auto drive = DriveSimulator({}, 4).Run();
+  FixedLagSmoother in_order{SmootherConfig()};
+  FixedLagSmoother swapped{SmootherConfig()};
+  const SmootherEstimate expected = Drive(drive, in_order);
+  for (std::size_t i = 21; i + 1 < drive.log.fixes.size(); i += 2) {
+    std::swap(drive.log.fixes[i], drive.log.fixes[i + 1]);
+  }
+  const SmootherEstimate estimate = Drive(drive, swapped);
+  EXPECT_LT(PositionError(estimate.X_WB, expected.X_WB), 5e-3);
+}
+
+TEST(FixedLagSmootherTest, AFixFromBeforeTheOdometryKeptIsRefusedAndCounted) {
+  const auto drive = DriveSimulator({}, 5).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  Drive(drive, smoother);
+  EXPECT_EQ(smoother.AddFix(drive.log.fixes.front()), FixOutcome::kLate);
+  EXPECT_EQ(smoother.counters().fixes_late, 1);
+}
+
+TEST(FixedLagSmootherTest, AFixAheadOfTheOdometryIsPutInItsPlaceWhenTheOdometryComes) {
+  const auto drive = DriveSimulator({}, 6).Run();
+  FixedLagSmoother on_time{SmootherConfig()};
+  FixedLagSmoother ahead{SmootherConfig()};
+  std::size_t next_fix = 0;
+  for (const OdometryStep& step : drive.log.odometry) {
+    // In the second, each fix comes before the odometry of the same moment.
+    const bool has_fix =
+        next_fix < drive.log.fixes.size() && drive.log.fixes[next_fix].time == step.time;
+    if (has_fix) ahead.AddFix(drive.log.fixes[next_fix]);
+    ASSERT_TRUE(on_time.AddOdometry(step));
+    ASSERT_TRUE(ahead.AddOdometry(step));
+    if (has_fix) on_time.AddFix(drive.log.fixes[next_fix++]);
+  }
+  EXPECT_EQ(ahead.counters().fixes_ahead, 1);  // the first, without any odometry
+  EXPECT_LT(PositionError(ahead.Estimate().X_WB, on_time.Estimate().X_WB), 0.1);
+}
+
+TEST(FixedLagSmootherTest, CrossesPiWithoutNoticing) {
+  for (const double yaw : {std::numbers::pi, -std::numbers::pi, 0.5 * std::numbers::pi}) {
+    const auto drive = DriveSimulator({.X_WB0 = Pose2(0.0, 0.0, yaw)}, 7).Run();
+    FixedLagSmoother smoother{SmootherConfig()};
+    const SmootherEstimate estimate = Drive(drive, smoother);
+    EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.6) << yaw;
+    EXPECT_EQ(smoother.counters().relocalizations, 0);
+    EXPECT_EQ(smoother.counters().fixes_gated, 0);
+  }
+}
+
+TEST(FixedLagSmootherTest, RecoversFromAConfidentWrongPrior) {
+  for (const bool has_heading : {true, false}) {
+    const DriveOptions options{.duration_s = 60.0, .has_heading = has_heading};
+    const auto drive = DriveSimulator(options, 8).Run();
+    FixedLagSmoother smoother{SmootherConfig()};
+    const Pose2 wrong(
+        options.X_WB0.x() + 80.0, options.X_WB0.y() - 60.0, options.X_WB0.yaw() + std::numbers::pi);
+    ASSERT_TRUE(smoother.Reset(
+        {.X_WB = wrong, .covariance = Eigen::Vector3d(0.01, 0.01, 1e-4).asDiagonal()}));
+    const SmootherEstimate estimate = Drive(drive, smoother);
+    EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.6) << has_heading;
+    EXPECT_EQ(smoother.counters().relocalizations, 1) << has_heading;
+  }
+}
+
+/// The fixes until the estimate is near the truth again after the body was carried 35 m.
+int FixesUntilFound(bool has_heading, unsigned seed) {
+  DriveOptions options{.duration_s = 120.0, .has_heading = has_heading};
+  const auto before = DriveSimulator(options, seed).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  Drive(before, smoother);
+  options.X_WB0 = before.X_WB_end * Pose2(-20.0, 30.0, 1.5);
+  auto after = DriveSimulator(options, seed + 100).Run();
+  const Duration shift =
+      before.log.odometry.back().time - after.log.odometry.front().time + milliseconds(50);
+  std::size_t step = 0;
+  int found_at = -1;
+  bool was_lost = false;
+  for (std::size_t i = 0; i < after.log.fixes.size(); ++i) {
+    for (; step < after.log.odometry.size() &&
+           after.log.odometry[step].time <= after.log.fixes[i].time;
+         ++step) {
+      after.log.odometry[step].time += shift;
+      EXPECT_TRUE(smoother.AddOdometry(after.log.odometry[step]));
+      after.log.odometry[step].time -= shift;
+    }
+    Fix fix = after.log.fixes[i];
+    fix.time += shift;
+    smoother.AddFix(fix);
+    const SmootherEstimate estimate = smoother.Estimate();
+    was_lost = was_lost || estimate.status == SmootherStatus::kLost;
+    const bool is_near = PositionError(estimate.X_WB, after.truth_at_fixes[i]) < 1.5;
+    if (!is_near) found_at = -1;
+    if (is_near && found_at < 0) found_at = static_cast<int>(i);
+  }
+  EXPECT_TRUE(was_lost);
+  EXPECT_EQ(smoother.counters().relocalizations, 1);
+  return found_at;
+}
+
+TEST(FixedLagSmootherTest, FindsACarriedBodyAgain) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    for (const bool has_heading : {true, false}) {
+      const int fixes = FixesUntilFound(has_heading, seed);
+      EXPECT_GE(fixes, 0) << seed;
+      EXPECT_LE(fixes, 35) << seed;
+    }
+  }
+}
+
+TEST(FixedLagSmootherTest, StandingStillCostsNothing) {
+  const auto drive = DriveSimulator({}, 9).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  Drive(drive, smoother);
+  const std::size_t keyframes = smoother.window().keyframes.size();
+  const std::size_t fixes = smoother.window().fixes.size();
+  MonotonicTime time = drive.log.odometry.back().time;
+  DriveSimulator simulator({}, 10);
+  for (int i = 0; i < 36000; ++i) {  // an hour at 10 Hz
+    time += milliseconds(100);
+    OdometryStep step;
+    step.time = time;
+    step.covariance = 1e-10 * Eigen::Matrix3d::Identity();
+    ASSERT_TRUE(smoother.AddOdometry(step));
+    smoother.AddFix(simulator.MakeFix(time, drive.X_WB_end));
+  }
+  EXPECT_LE(smoother.window().keyframes.size(), keyframes + 1);
+  EXPECT_LE(smoother.window().fixes.size(), fixes + 60);
+  EXPECT_GT(smoother.counters().fixes_redundant, 35000);
+  EXPECT_EQ(smoother.Estimate().status, SmootherStatus::kOk);
+  EXPECT_LT(PositionError(smoother.Estimate().X_WB, drive.X_WB_end), 0.6);
+}
+
+TEST(FixedLagSmootherTest, RefusesWhatIsNotFinite) {
+  const auto drive = DriveSimulator({}, 11).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  const Pose2 before = Drive(drive, smoother).X_WB;
+  Fix fix = drive.log.fixes.back();
+  fix.X_WB = Pose2(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.0);
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
+  fix = drive.log.fixes.back();
+  fix.covariance(0, 0) = -1.0;
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
+  fix.covariance(0, 0) = 1e308;
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
+  EXPECT_EQ(smoother.counters().fixes_invalid, 3);
+
+  OdometryStep step = drive.log.odometry.back();
+  EXPECT_FALSE(smoother.AddOdometry(step));  // the same time once more
+  step.time += seconds(1);
+  step.X_BprevB = Pose2(0.0, 0.0, std::numeric_limits<double>::infinity());
+  const auto refused = smoother.AddOdometry(step);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::kInvalidInput);
+  EXPECT_EQ(smoother.counters().odometry_refused, 2);
+  EXPECT_EQ(smoother.Estimate().X_WB.translation(), before.translation());
+
+  EXPECT_FALSE(smoother.Reset({.X_WB = Pose2(), .covariance = Eigen::Matrix3d::Zero()}));
+}
+
+TEST(FixedLagSmootherTest, SaysHowFarItKnowsItsPose) {
+  const auto drive = DriveSimulator({}, 12).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  EXPECT_EQ(smoother.Estimate().status, SmootherStatus::kUninitialised);
+  EXPECT_FALSE(smoother.Estimate().has_pose);
+  ASSERT_TRUE(smoother.AddOdometry(drive.log.odometry.front()));
+  smoother.AddFix(drive.log.fixes.front());
+  EXPECT_EQ(smoother.Estimate().status, SmootherStatus::kUninitialised);
+  EXPECT_TRUE(smoother.Estimate().has_pose);
+
+  FixedLagSmoother driven{SmootherConfig()};
+  const SmootherEstimate at_end = Drive(drive, driven);
+  EXPECT_EQ(at_end.status, SmootherStatus::kOk);
+  OdometryStep step = drive.log.odometry.back();
+  for (int i = 0; i < 200; ++i) {
+    step.time += milliseconds(50);
+    ASSERT_TRUE(driven.AddOdometry(step));
+  }
+  const SmootherEstimate later = driven.Estimate();
+  EXPECT_EQ(later.status, SmootherStatus::kDeadReckoning);
+  EXPECT_NEAR(*later.time_since_fix_s, 10.95, 0.1);
+  EXPECT_NEAR(later.distance_since_fix_m, 17.0, 1.5);
+  EXPECT_GT(later.covariance(1, 1), at_end.covariance(1, 1));
+}
+
+TEST(FixedLagSmootherTest, AResetIsAboutThisMoment) {
+  const auto drive = DriveSimulator({}, 13).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  Drive(drive, smoother);
+  const Pose2 X_WB(1.0, 2.0, 3.0);
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(0.04, 0.04, 0.01).asDiagonal();
+  ASSERT_TRUE(smoother.Reset({.X_WB = X_WB, .covariance = covariance}));
+  const SmootherEstimate estimate = smoother.Estimate();
+  EXPECT_LT(PositionError(estimate.X_WB, X_WB), 1e-12);
+  EXPECT_NEAR(estimate.covariance(0, 0), 0.04, 1e-5);
+  OdometryStep step = drive.log.odometry.back();
+  step.time += milliseconds(50);
+  EXPECT_TRUE(smoother.AddOdometry(step));
+}
+
+TEST(SmoothAllTest, BeatsTheCausalEstimate) {
+  std::vector<double> causal;
+  std::vector<double> smoothed;
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    const auto drive = DriveSimulator({.outlier_share = 0.2}, seed).Run();
+    const auto before = SmoothCausally(drive.log, SmootherConfig());
+    const auto after = SmoothAll(drive.log, SmootherConfig());
+    for (std::size_t i = 30; i < before.size(); ++i) {
+      causal.push_back(PositionError(before[i].X_WB, drive.truth_at_fixes[i]));
+      smoothed.push_back(PositionError(after[i].X_WB, drive.truth_at_fixes[i]));
+    }
+  }
+  EXPECT_LT(Summarize(smoothed).rmse, 0.8 * Summarize(causal).rmse);
+}
+
+}  // namespace
+}  // namespace relocd
