@@ -31,9 +31,11 @@ struct ProcessConfig {
     visit("after",
           self.after,
           "starts when these are ready, have failed, or had their start_timeout_s");
-    visit("watchdog_s",
-          self.watchdog_s,
-          "0 or in [0.1, 3600]; restarted after so long without a sign of life; 0: not watched");
+    visit(
+        "watchdog_s",
+        self.watchdog_s,
+        "0 or in [0.1, 3600]; restarted after so long without a sign of life; 0: not watched, and "
+        "ready at once");
     visit("start_timeout_s",
           self.start_timeout_s,
           "in [0.1, 3600]; for its first sign of life, and how long others wait for it");

@@ -24,7 +24,10 @@ MonotonicTime WatchdogDeadline(MonotonicTime now, Duration timeout, const Restar
 }
 
 RestartTransition Start(const RestartState& state, MonotonicTime now, const RestartLimits& limits) {
-  RestartState next = Enter(state, ProcessState::kStarting, now);
+  // Who is not watched is not expected to say that it is ready either.
+  const bool is_watched = limits.watchdog != Duration::zero();
+  RestartState next =
+      Enter(state, is_watched ? ProcessState::kStarting : ProcessState::kReady, now);
   next.started = now;
   // Until its event loop turns for the first time it may load a map or open a device.
   next.deadline = WatchdogDeadline(now, std::max(limits.start_timeout, limits.watchdog), limits);

@@ -66,6 +66,7 @@ struct Supervisor::Child {
   int last_exit_code = -1;
   std::int64_t resident_bytes = 0;
   std::string status_text;
+  bool could_not_start = false;
   bool is_leaving = false;  ///< Not in the table any longer: forgotten once it has ended.
 };
 
@@ -146,6 +147,12 @@ void Supervisor::Apply(std::vector<ProcessSpec> table, MonotonicTime now) {
     }
   }
   ArmTimer(now - options_.period);  // at once
+}
+
+void Supervisor::SetBackoff(Duration initial, Duration max, Duration reset) {
+  options_.backoff_initial = initial;
+  options_.backoff_max = max;
+  options_.backoff_reset = reset;
 }
 
 void Supervisor::Adopt(Child& child, ProcessSpec spec, MonotonicTime now) {
@@ -253,6 +260,7 @@ void Supervisor::Perform(Child& child, RestartAction action, MonotonicTime now) 
 
 void Supervisor::Start(Child& child, MonotonicTime now) {
   child.status_text.clear();
+  child.could_not_start = false;
   child.last_sign = now;
   child.process.reset();
   if (!child.notify) {
@@ -273,6 +281,7 @@ void Supervisor::Start(Child& child, MonotonicTime now) {
   if (!process) {
     Log(kError, child.spec.name + ": " + process.error().message);
     child.status_text = process.error().message;
+    child.could_not_start = true;
     child.last_exit_code =
         process.error().kind == ErrorKind::kInvalidInput ? kExitConfig : kExitNotLoaded;
     return Feed(child, {.kind = RestartEventKind::kExited, .exit_code = child.last_exit_code}, now);
@@ -371,10 +380,10 @@ void Supervisor::LogTransition(const Child& child,
       return;
     case ProcessState::kFailed:
       Log(kError,
-          fmt::format("{}: exit code {} says that its input is wrong: mend it and reload relocd "
-                      "(systemctl reload relocd, or SIGHUP)",
+          fmt::format("{}: {}: mend it and reload relocd (systemctl reload relocd, or SIGHUP)",
                       name,
-                      event.exit_code));
+                      child.could_not_start ? "cannot be started"
+                                            : "exit code 78 says that its input is wrong"));
       return;
     case ProcessState::kStopping:
       if (event.kind == RestartEventKind::kTick || event.kind == RestartEventKind::kHung) {

@@ -46,7 +46,7 @@ struct ProcessReport {
   double watchdog_age_s = 0.0;  ///< Since its last sign of life.
   double backoff_s = 0.0;       ///< Until the next start.
   std::int64_t resident_bytes = 0;
-  std::string status_text;
+  std::string status_text{};
 };
 
 /// Starts, watches, restarts and stops a table of child processes.
@@ -77,6 +77,9 @@ class Supervisor {
   /// Replaces the table: starts who is new, stops who is gone, restarts who has changed, tries
   /// again who had failed, and leaves all others alone.
   void Apply(std::vector<ProcessSpec> table, MonotonicTime now);
+
+  /// For the children that end from now on.
+  void SetBackoff(Duration initial, Duration max, Duration reset);
 
   /// Stops all children tier by tier: the next tier when all of one have ended.
   void Stop(MonotonicTime now);
