@@ -4,7 +4,6 @@
 
 #include <utility>
 
-
 #include "can/can_socket.h"
 #include "can/candump_source.h"
 #include "can/socket_can_source.h"
@@ -13,16 +12,27 @@
 namespace relocd {
 namespace {
 
-/// An inherited socket stays open for the next try: each gets a duplicate.
-Result<CanSocket> DuplicateCanSocket(int inherited, const CanSocketOptions& options) {
-  UniqueFd fd(::fcntl(inherited, F_DUPFD_CLOEXEC, 0));
-  const std::string name = "file descriptor " + std::to_string(inherited);
-  if (!fd.valid()) return SystemError(ErrorKind::kInvalidInput, name);
-  if (::fcntl(fd.get(), F_SETFL, O_NONBLOCK) != 0) {
-    return SystemError(ErrorKind::kInvalidInput, name);
+/// Takes over an inherited socket, which there is only once.
+class InheritedCanSocket {
+ public:
+  InheritedCanSocket(int fd, CanSocketOptions options) : fd_(fd), options_(std::move(options)) {}
+
+  Result<CanSocket> operator()() {
+    const std::string name = "file descriptor " + std::to_string(fd_);
+    if (std::exchange(taken_, true)) {
+      return Error{ErrorKind::kUnavailable, name + ": was lost, and can only be inherited again"};
+    }
+    if (::fcntl(fd_, F_SETFL, O_NONBLOCK) != 0 || ::fcntl(fd_, F_SETFD, FD_CLOEXEC) != 0) {
+      return SystemError(ErrorKind::kInvalidInput, name);
+    }
+    return CanSocket::FromFd(UniqueFd(fd_), options_);
   }
-  return CanSocket::FromFd(std::move(fd), options);
-}
+
+ private:
+  int fd_;
+  CanSocketOptions options_;
+  bool taken_ = false;
+};
 
 }  // namespace
 
@@ -40,7 +50,7 @@ std::unique_ptr<CanSource> MakeCanSource(const CanConfig& config,
   if (config.source == "fd") {
     return std::make_unique<SocketCanSource>(
         "CAN frames from file descriptor " + std::to_string(config.fd),
-        [=] { return DuplicateCanSocket(config.fd, options); });
+        InheritedCanSocket(config.fd, options));
   }
   return std::make_unique<SocketCanSource>(
       config.interface, [=] { return CanSocket::Open(config.interface, options); });

@@ -17,7 +17,7 @@ namespace relocd {
 /// One line of a candump log.
 struct CandumpRecord {
   std::int64_t time_ns = 0;  ///< The recording's own clock.
-  std::string interface{};
+  std::string interface {};
   CanFrame frame{};  ///< Its receive_time is `time_ns`.
 };
 

@@ -22,6 +22,17 @@ constexpr Duration kLateness = std::chrono::milliseconds(500);
 /// does not know of.
 constexpr Duration kLongestWait = std::chrono::hours(1);
 
+/// Reads a whole log, so that a line that is none is found before the robot drives by it.
+Result<void> CheckLog(const std::string& path) {
+  auto log = CandumpLog::Open(path);
+  if (!log) return std::move(log).error();
+  while (true) {
+    auto record = log->Next();
+    if (!record) return std::move(record).error();
+    if (!record->has_value()) return {};
+  }
+}
+
 }  // namespace
 
 CandumpSource::CandumpSource(const CanConfig& config, std::vector<CanId> ids, MonotonicTime epoch)
@@ -32,6 +43,7 @@ CandumpSource::CandumpSource(const CanConfig& config, std::vector<CanId> ids, Mo
       epoch_(epoch) {}
 
 Result<void> CandumpSource::Open() {
+  if (auto ok = CheckLog(path_); !ok) return Error{ErrorKind::kInvalidInput, ok.error().message};
   auto log = CandumpLog::Open(path_);
   if (!log) return std::move(log).error();
   log_.emplace(std::move(log).value());

@@ -18,6 +18,9 @@ class CandumpSource final : public CanSource {
  public:
   CandumpSource(const CanConfig& config, std::vector<CanId> ids, MonotonicTime epoch);
 
+  /// Reads the whole log once to check it.
+  ///
+  /// @return kInvalidInput when it is not there, or a line is none, or none is due within an hour.
   Result<void> Open() override;
   [[nodiscard]] int fd() const override { return timer_.get(); }
   Result<std::optional<CanFrame>> Receive() override;

@@ -31,8 +31,9 @@ struct DbcSignal {
   double minimum = 0.0;  ///< As the file says; equal to the maximum where it says nothing.
   double maximum = 0.0;
   std::string unit{};
-  bool is_multiplexor = false;             ///< Its raw value says which signals are in the frame.
-  std::optional<std::uint64_t> mux_value{};  ///< In the frame only if the multiplexor has this value.
+  bool is_multiplexor = false;  ///< Its raw value says which signals are in the frame.
+  std::optional<std::uint64_t>
+      mux_value{};  ///< In the frame only if the multiplexor has this value.
 };
 
 struct DbcMessage {

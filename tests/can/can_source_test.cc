@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <fstream>
 #include <string>
 
@@ -74,11 +75,10 @@ TEST(CandumpSourceTest, ResumesInTheMiddleWhenItIsOpenedLate) {
 TEST(CandumpSourceTest, SaysWhichLineIsNone) {
   const std::string path = WriteTemporary("broken.log", "(10.0) can0 0AA#01\n(10.1) can0 0AA#0\n");
   CandumpSource source(LogConfig(path), {}, MonotonicClock::now());
-  ASSERT_TRUE(source.Open());
-  const auto frame = source.Receive();
-  ASSERT_FALSE(frame);
-  EXPECT_EQ(frame.error().kind, ErrorKind::kInvalidInput);
-  EXPECT_EQ(frame.error().message,
+  const auto opened = source.Open();
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().kind, ErrorKind::kInvalidInput);
+  EXPECT_EQ(opened.error().message,
             path + ": line 2: data '0', must be pairs of hexadecimal digits");
   EXPECT_FALSE(source.is_open());
 }
@@ -93,7 +93,7 @@ TEST(CandumpSourceTest, RefusesToWaitForAnotherClock) {
               HasSubstr("is due in 46409 s, playback_start_s must be near the recording's first"));
 }
 
-TEST(CandumpSourceTest, IsUnavailableWithoutItsFile) {
+TEST(CandumpSourceTest, SaysThatItsFileIsMissing) {
   CandumpSource source(LogConfig("/no/such.log"), {}, MonotonicClock::now());
   EXPECT_EQ(source.Open().error().message, "opening /no/such.log: No such file or directory");
 }
@@ -147,6 +147,20 @@ TEST(MakeCanSourceTest, ConnectsToAUnixSocket) {
   ASSERT_TRUE(frame && frame->has_value());
   EXPECT_EQ((*frame)->id.value, 0x42U);
   ::unlink(path.c_str());
+}
+
+TEST(MakeCanSourceTest, TakesOverAnInheritedSocketOnce) {
+  std::array<int, 2> fds{-1, -1};
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET, 0, fds.data()), 0);
+  UniqueFd peer(fds[1]);
+  const auto source = MakeCanSource({.source = "fd", .fd = fds[0]}, {}, {});
+  ASSERT_TRUE(source->Open());
+  const auto frame = source->Receive();  // does not block
+  ASSERT_TRUE(frame);
+  EXPECT_FALSE(frame->has_value());
+  peer = UniqueFd();
+  EXPECT_FALSE(source->Receive());
+  EXPECT_EQ(source->Open().error().kind, ErrorKind::kUnavailable);
 }
 
 TEST(MakeCanSourceTest, NamesAFileDescriptorThatIsNone) {
