@@ -63,20 +63,15 @@ class OdometryDaemon final : public Daemon {
   Result<void> TryOpen() {
     auto ok = source_->Open();
     if (ok) ok = loop_.OnReadable(source_->fd(), [this] { HandleSource(); });
-    if (!ok) {
-      Lost(ok.error().message);
-      return ok;
-    }
-    if (!source_error_.empty()) {
+    node_.HandleSourceError(ok ? "" : ok.error().message);
+    if (ok && std::exchange(is_lost_, false)) {
       LogLine(kNotice, "odometryd", fmt::format("{} is there again", source_->description()));
     }
-    source_error_.clear();
-    node_.HandleSourceError("");
-    return {};
+    return ok;
   }
 
   void Reopen() {
-    if (!source_->is_open()) static_cast<void>(TryOpen().has_value());  // Lost() tells of failures
+    if (!source_->is_open()) static_cast<void>(TryOpen().has_value());  // the status tells of it
   }
 
   void HandleSource() {
@@ -97,8 +92,8 @@ class OdometryDaemon final : public Daemon {
   }
 
   void Lost(const std::string& error) {
-    if (error != source_error_) LogLine(kWarning, "odometryd", error);
-    source_error_ = error;
+    LogLine(kWarning, "odometryd", error);
+    is_lost_ = true;
     node_.HandleSourceError(error);
   }
 
