@@ -100,7 +100,7 @@ class OdometryDaemon final : public Daemon {
   EventLoop& loop_;
   std::unique_ptr<CanSource> source_;
   OdometryNode node_;
-  std::string source_error_;      ///< Why the source is not open.
+  bool is_lost_ = false;          ///< It was open before.
   std::vector<CanFrame> frames_;  ///< Kept between calls, so that receiving does not allocate.
 };
 
