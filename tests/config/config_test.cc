@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -15,14 +16,13 @@ using testing::HasSubstr;
 
 class ConfigTest : public testing::Test {
  protected:
-  ~ConfigTest() override { std::filesystem::remove(path_); }
-
   Result<Config> Load(const std::string& text, const std::vector<std::string>& overrides = {}) {
     EXPECT_TRUE(WriteFileAtomically(path_, text));
     return LoadConfig(path_, overrides);
   }
 
-  std::string path_ = testing::TempDir() + "relocd_config_test.yaml";
+  TemporaryFolder temporary_;
+  std::string path_ = temporary_.path() + "/robot.yaml";
 };
 
 TEST_F(ConfigTest, TheDefaultsAreValid) {

@@ -1,11 +1,12 @@
 #include "messaging/lcm_bus.h"
 
-#include <cstdio>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
+
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -37,8 +38,8 @@ TEST(LcmBusTest, RefusesAProviderThatIsNone) {
 }
 
 TEST(LcmBusTest, WritesAndReadsALogFile) {
-  const std::string path = testing::TempDir() + "lcm_bus_test.lcmlog";
-  std::remove(path.c_str());
+  const TemporaryFolder temporary;
+  const std::string path = temporary.path() + "/test.lcmlog";
   {
     auto bus = LcmBus::Open("file://" + path + "?mode=w");
     ASSERT_TRUE(bus) << bus.error().message;
@@ -54,7 +55,6 @@ TEST(LcmBusTest, WritesAndReadsALogFile) {
   for (int i = 0; i < 10000 && utime == 0; ++i)
     (*bus)->HandlePending();
   EXPECT_EQ(utime, 42);
-  std::remove(path.c_str());
 }
 
 }  // namespace

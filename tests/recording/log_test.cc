@@ -1,4 +1,3 @@
-#include <cstdio>
 #include <fstream>
 #include <random>
 #include <string>
@@ -11,6 +10,7 @@
 #include "core/file.h"
 #include "recording/log_reader.h"
 #include "recording/log_writer.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -19,8 +19,6 @@ using testing::HasSubstr;
 
 class LogTest : public testing::Test {
  protected:
-  ~LogTest() override { std::remove(path_.c_str()); }
-
   void WriteEvents(int count) {
     auto writer = LogWriter::Create(path_);
     ASSERT_TRUE(writer) << writer.error().message;
@@ -42,7 +40,8 @@ class LogTest : public testing::Test {
     return events;
   }
 
-  std::string path_ = testing::TempDir() + "relocd_log_test.lcmlog";
+  TemporaryFolder temporary_;
+  std::string path_ = temporary_.path() + "/test.lcmlog";
 };
 
 TEST_F(LogTest, ReadsBackWhatWasWritten) {

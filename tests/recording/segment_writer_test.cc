@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "recording/log_reader.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -18,12 +19,9 @@ namespace fs = std::filesystem;
 
 class SegmentWriterTest : public testing::Test {
  protected:
-  SegmentWriterTest() { fs::remove_all(config_.directory); }
-  ~SegmentWriterTest() override { fs::remove_all(config_.directory); }
-
-  static RecorderConfig MakeConfig() {
+  RecorderConfig MakeConfig() const {
     RecorderConfig config;
-    config.directory = testing::TempDir() + "relocd_segments";
+    config.directory = temporary_.path() + "/segments";
     config.segment_mb = 1;
     config.max_total_mb = 3;
     config.min_free_mb = 0;
@@ -46,6 +44,7 @@ class SegmentWriterTest : public testing::Test {
     return reader->counters().events;
   }
 
+  TemporaryFolder temporary_;
   RecorderConfig config_ = MakeConfig();
   std::vector<std::uint8_t> hundred_kilobytes_ = std::vector<std::uint8_t>(100'000);
 };
