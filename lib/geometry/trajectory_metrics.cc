@@ -125,23 +125,31 @@ std::vector<RelativeError> RelativeErrorsOverTime(std::span<const PosePair> pair
 
 void CoverageCounter::Add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
   RELOCD_CHECK(IsCovariance(covariance), "a covariance that is none");
-  const double position = SquaredMahalanobis(error.head<2>(), covariance.topLeftCorner<2, 2>());
-  const double pose = SquaredMahalanobis(error, covariance);
-  ++count_;
-  if (position <= kChiSquared95Dof2) ++positions_inside_;
-  if (pose <= kChiSquared95Dof3) ++poses_inside_;
-  position_sum_ += position;
-  pose_sum_ += pose;
+  AddPosition(error.head<2>(), covariance.topLeftCorner<2, 2>());
+  const double distance = SquaredMahalanobis(error, covariance);
+  ++pose_count_;
+  if (distance <= kChiSquared95Dof3) ++poses_inside_;
+  pose_sum_ += distance;
+}
+
+void CoverageCounter::AddPosition(const Eigen::Vector2d& error, const Eigen::Matrix2d& covariance) {
+  RELOCD_CHECK(IsCovariance(covariance), "a covariance that is none");
+  const double distance = SquaredMahalanobis(error, covariance);
+  ++position_count_;
+  if (distance <= kChiSquared95Dof2) ++positions_inside_;
+  position_sum_ += distance;
 }
 
 Coverage CoverageCounter::Total() const {
-  if (count_ == 0) return {};
-  const auto divisor = static_cast<double>(count_);
-  return {.count = count_,
-          .position_share = static_cast<double>(positions_inside_) / divisor,
-          .pose_share = static_cast<double>(poses_inside_) / divisor,
-          .position_nees = position_sum_ / divisor,
-          .pose_nees = pose_sum_ / divisor};
+  const auto share = [](double part, std::size_t whole) {
+    return whole == 0 ? 0.0 : part / static_cast<double>(whole);
+  };
+  return {.position_count = position_count_,
+          .pose_count = pose_count_,
+          .position_share = share(static_cast<double>(positions_inside_), position_count_),
+          .pose_share = share(static_cast<double>(poses_inside_), pose_count_),
+          .position_nees = share(position_sum_, position_count_),
+          .pose_nees = share(pose_sum_, pose_count_)};
 }
 
 }  // namespace relocd

@@ -59,7 +59,8 @@ std::vector<RelativeError> RelativeErrorsOverTime(std::span<const PosePair> pair
 
 /// How well reported covariances describe the errors.
 struct Coverage {
-  std::size_t count = 0;
+  std::size_t position_count = 0;
+  std::size_t pose_count = 0;   ///< Of these, with a heading.
   double position_share = 0.0;  ///< Of the errors (x, y) inside their 95 % ellipse: 0.95 is honest.
   double pose_share = 0.0;      ///< Of the errors (x, y, yaw) inside their 95 % ellipsoid.
   double position_nees = 0.0;   ///< Mean of the squared Mahalanobis distances; 2 is honest.
@@ -73,10 +74,14 @@ class CoverageCounter {
   /// @param covariance  3x3 of that right perturbation (x, y, yaw), positive definite.
   void Add(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance);
 
+  /// Of an estimate or a truth without a heading, both in the same axes.
+  void AddPosition(const Eigen::Vector2d& error, const Eigen::Matrix2d& covariance);
+
   [[nodiscard]] Coverage Total() const;
 
  private:
-  std::size_t count_ = 0;
+  std::size_t position_count_ = 0;
+  std::size_t pose_count_ = 0;
   std::size_t positions_inside_ = 0;
   std::size_t poses_inside_ = 0;
   double position_sum_ = 0.0;

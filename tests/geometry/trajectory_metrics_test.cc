@@ -131,7 +131,8 @@ TEST(CoverageTest, HonestCovariancesAreFoundHonest) {
     boastful.Add(error, 0.25 * covariance);
   }
   const Coverage coverage = counter.Total();
-  EXPECT_EQ(coverage.count, 20'000U);
+  EXPECT_EQ(coverage.position_count, 20'000U);
+  EXPECT_EQ(coverage.pose_count, 20'000U);
   EXPECT_NEAR(coverage.position_share, 0.95, 0.005);  // 3 sigma of 20,000 draws
   EXPECT_NEAR(coverage.pose_share, 0.95, 0.005);
   EXPECT_NEAR(coverage.position_nees, 2.0, 0.06);
@@ -140,8 +141,17 @@ TEST(CoverageTest, HonestCovariancesAreFoundHonest) {
   EXPECT_NEAR(boastful.Total().pose_nees, 12.0, 0.3);
 }
 
+TEST(CoverageTest, AnEstimateWithoutAHeadingCountsForThePositionOnly) {
+  CoverageCounter counter;
+  counter.AddPosition({1.0, 2.0}, Eigen::Matrix2d::Identity());
+  EXPECT_EQ(counter.Total().position_count, 1U);
+  EXPECT_EQ(counter.Total().pose_count, 0U);
+  EXPECT_DOUBLE_EQ(counter.Total().position_nees, 5.0);
+  EXPECT_DOUBLE_EQ(counter.Total().position_share, 1.0);  // 5 < 5.99
+}
+
 TEST(CoverageTest, NothingReportedIsNothingCounted) {
-  EXPECT_EQ(CoverageCounter().Total().count, 0U);
+  EXPECT_EQ(CoverageCounter().Total().position_count, 0U);
 }
 
 /// Lines `image qw qx qy qz tx ty tz ...` with the world in the camera, by image.
