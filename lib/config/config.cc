@@ -51,6 +51,7 @@ void CompletePaths(const std::filesystem::path& directory, Config& config) {
   CompletePath(directory, config.can.path);
   CompletePath(directory, config.can.dbc_file);
   CompletePath(directory, config.inference.map_path);
+  CompletePath(directory, config.localization.state_file);
   CompletePath(directory, config.recorder.directory);
 }
 
@@ -91,6 +92,7 @@ Result<void> Config::Validate() const {
   if (auto ok = check("can", can); !ok) return ok;
   if (auto ok = check("odometry", odometry); !ok) return ok;
   if (auto ok = check("inference", inference); !ok) return ok;
+  if (auto ok = check("localization", localization); !ok) return ok;
   if (auto ok = check("recorder", recorder); !ok) return ok;
   return check("supervisor", supervisor);
 }

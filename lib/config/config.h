@@ -10,6 +10,7 @@
 #include "odometry/wheel_odometry.h"
 #include "recording/recorder_config.h"
 #include "relocalization/inference_config.h"
+#include "smoothing/localization_config.h"
 #include "supervision/process_spec.h"
 
 namespace relocd {
@@ -35,6 +36,7 @@ struct Config {
   CanConfig can;
   OdometryConfig odometry;
   InferenceConfig inference;
+  LocalizationConfig localization;
   RecorderConfig recorder;
   SupervisionConfig supervisor;
 
@@ -47,6 +49,9 @@ struct Config {
     visit("can", self.can, "odometryd: where the vehicle's CAN frames come from.");
     visit("odometry", self.odometry, "odometryd: how the wheels move the body.");
     visit("inference", self.inference, "inferenced: how images become camera poses.");
+    visit("localization",
+          self.localization,
+          "smootherd: how odometry and camera poses become the vehicle's pose.");
     visit("recorder", self.recorder, "recorderd: what is kept of the messages.");
     visit("supervisor", self.supervisor, "relocd: the daemons it starts and watches.");
   }
