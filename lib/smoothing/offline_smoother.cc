@@ -31,7 +31,8 @@ void Feed(const MotionLog& log, FixedLagSmoother& smoother, AfterFix after_fix) 
     smoother.AddFix(fix);
     after_fix(fix);
   }
-  feed_odometry(MonotonicTime::max());
+  // One more, to interpolate at the last fix; what comes later tells nothing of the fixes' times.
+  if (step < log.odometry.size()) feed_odometry(log.odometry[step].time);
 }
 
 /// All keyframes of a log, first as the fixed-lag smoother left them.
