@@ -35,20 +35,26 @@ std::vector<CameraFromWorld> PriorHypotheses(const std::optional<Pose3>& X_WC_pr
   return {{.R_CW = R_CW, .p_CW = R_CW * (p_WM - X_WC_prior->translation())}};
 }
 
+/// The inlier threshold in pixels of this camera.
+double ThresholdPx(const CameraPoseOptions& options, const PackedCorrespondences& correspondences) {
+  return 1e-3 * options.inlier_threshold_mrad * std::sqrt(correspondences.focal().prod());
+}
+
 /// Refines each hypothesis on the random subset and scores it on everything; best first.
 void RefineLocally(const PackedCorrespondences& correspondences,
                    const CameraPoseOptions& options,
                    std::vector<PoseHypothesis>& hypotheses) {
+  const double threshold_px = ThresholdPx(options, correspondences);
   const RefinementSchedule schedule{.steps = kLocalSteps,
-                                    .start_threshold_px = 2.0 * options.inlier_threshold_px,
-                                    .end_threshold_px = options.inlier_threshold_px};
+                                    .start_threshold_px = 2.0 * threshold_px,
+                                    .end_threshold_px = threshold_px};
   for (PoseHypothesis& hypothesis : hypotheses) {
     const RefinedPose refined = RefinePose(correspondences,
                                            static_cast<std::size_t>(options.scored_points),
                                            hypothesis.X_CM,
                                            schedule);
-    const double score = SoftInlierScore(
-        correspondences, correspondences.size(), refined.X_CM, options.inlier_threshold_px);
+    const double score =
+        SoftInlierScore(correspondences, correspondences.size(), refined.X_CM, threshold_px);
     if (!(score > hypothesis.score)) continue;
     hypothesis.X_CM = refined.X_CM;
     hypothesis.score = score;
@@ -75,13 +81,14 @@ Matrix6d SpreadOfNearlyEqual(const std::vector<PoseHypothesis>& hypotheses) {
 RefinedPose RefineOnAll(const PackedCorrespondences& correspondences,
                         const CameraPoseOptions& options,
                         const PoseHypothesis& best) {
+  const double threshold_px = ThresholdPx(options, correspondences);
   RefinementSchedule schedule{.steps = options.refinement_steps,
-                              .start_threshold_px = options.inlier_threshold_px,
-                              .end_threshold_px = 0.5 * options.inlier_threshold_px};
+                              .start_threshold_px = threshold_px,
+                              .end_threshold_px = 0.5 * threshold_px};
   const RefinedPose refined =
       RefinePose(correspondences, correspondences.size(), best.X_CM, schedule);
-  const double score = SoftInlierScore(
-      correspondences, correspondences.size(), refined.X_CM, options.inlier_threshold_px);
+  const double score =
+      SoftInlierScore(correspondences, correspondences.size(), refined.X_CM, threshold_px);
   if (score > kNearlyEqual * best.score) return refined;
   schedule.steps = 0;  // it ran away: stay, and say how certain that is
   return RefinePose(correspondences, correspondences.size(), best.X_CM, schedule);
@@ -129,7 +136,7 @@ Result<void> CameraPoseOptions::Validate() const {
                           {"scored_points", 1.0 * scored_points, 4.0, 1e5},
                           {"refined_hypotheses", 1.0 * refined_hypotheses, 1.0, 1e3},
                           {"refinement_steps", 1.0 * refinement_steps, 1.0, 100.0},
-                          {"inlier_threshold_px", inlier_threshold_px, 0.1, 1e3}};
+                          {"inlier_threshold_mrad", inlier_threshold_mrad, 0.1, 1e3}};
   for (const Limit& limit : limits) {
     if (!(limit.value >= limit.low && limit.value <= limit.high)) {
       return OutOfRange(
@@ -161,12 +168,13 @@ CameraPoseResult EstimateCameraPose(std::span<const Correspondence> corresponden
                                     const std::optional<Pose3>& X_WC_prior,
                                     std::uint64_t seed) {
   const PackedCorrespondences packed(correspondences, camera, seed);
+  const double threshold_px = ThresholdPx(options, packed);
   PoseRansacResult found = FindPoses(packed,
                                      {.hypotheses = options.hypotheses,
                                       .max_tries = options.max_tries,
                                       .kept = options.refined_hypotheses,
                                       .scored_points = options.scored_points,
-                                      .threshold_px = options.inlier_threshold_px},
+                                      .threshold_px = threshold_px},
                                      PriorHypotheses(X_WC_prior, packed.p_WM()),
                                      seed);
   CameraPoseResult result;
@@ -180,12 +188,11 @@ CameraPoseResult EstimateCameraPose(std::span<const Correspondence> corresponden
 
   RefineLocally(packed, options, found.best);
   const RefinedPose refined = RefineOnAll(packed, options, found.best.front());
-  const InlierCount inliers = CountInliers(packed, refined.X_CM, options.inlier_threshold_px);
+  const InlierCount inliers = CountInliers(packed, refined.X_CM, threshold_px);
   result.inliers = static_cast<int>(inliers.inliers);
   result.reprojection_rms_px = inliers.rms_px;
-  result.confidence =
-      SoftInlierScore(packed, packed.size(), refined.X_CM, options.inlier_threshold_px) /
-      static_cast<double>(correspondences.size());
+  result.confidence = SoftInlierScore(packed, packed.size(), refined.X_CM, threshold_px) /
+                      static_cast<double>(correspondences.size());
   if (!(result.confidence >= options.calibration.min_confidence)) {
     result.status = CameraPoseStatus::kLowConfidence;
     return result;

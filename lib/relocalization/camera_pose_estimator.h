@@ -29,7 +29,7 @@ struct CameraPoseOptions {
   int scored_points = 600;
   int refined_hypotheses = 6;
   int refinement_steps = 12;
-  double inlier_threshold_px = 10.0;
+  double inlier_threshold_mrad = 15.0;
   double max_sigma_t_m = 20.0;
   double max_sigma_r_rad = 0.3;
   PoseCalibration calibration;  ///< Not for the config: the map brings it.
@@ -47,9 +47,10 @@ struct CameraPoseOptions {
           self.refined_hypotheses,
           "in [1, 1000]; hypotheses that are scored on everything and refined");
     visit("refinement_steps", self.refinement_steps, "in [1, 100]; Gauss-Newton steps at the end");
-    visit("inlier_threshold_px",
-          self.inlier_threshold_px,
-          "in [0.1, 1000]; reprojection error up to which a correspondence supports a pose");
+    visit("inlier_threshold_mrad",
+          self.inlier_threshold_mrad,
+          "in [0.1, 1000]; reprojection error up to which a correspondence supports a pose, as the "
+          "angle that it is on the optical axis");
     visit("max_sigma_t_m",
           self.max_sigma_t_m,
           "> 0; a pose whose position is less certain along some axis is none");

@@ -40,15 +40,15 @@ class OutlierShareTest : public testing::TestWithParam<int> {};
 
 TEST_P(OutlierShareTest, FindsThePoseAndTellsInliersFromOutliers) {
   const double share = GetParam() / 100.0;
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
     const Scene scene = MakeScene({.outlier_share = share}, seed);
     const CameraPoseResult result = Estimate(scene);
     ASSERT_EQ(result.status, CameraPoseStatus::kOk) << "seed " << seed;
     EXPECT_LT(ErrorOf(result, scene).head<3>().norm(), 0.15) << "seed " << seed;
     EXPECT_LT(ErrorOf(result, scene).tail<3>().norm(), 0.01) << "seed " << seed;
 
-    // Ten sigma hold all inliers, and some outliers meet their pixel by chance: a disc of 10 px in
-    // an image of 640 x 480 is 0.1 %.
+    // 7.5 sigma hold all inliers, and some outliers meet their pixel by chance: a disc of 7.5 px in
+    // an image of 640 x 480 is 0.06 %.
     int inliers = 0;
     for (const bool is_inlier : scene.is_inlier)
       inliers += is_inlier ? 1 : 0;
@@ -70,7 +70,7 @@ INSTANTIATE_TEST_SUITE_P(Shares,
 class CovarianceTest : public testing::TestWithParam<int> {};
 
 TEST_P(CovarianceTest, IsThatOfTheErrorOverManyScenes) {
-  constexpr int kScenes = 400;
+  constexpr int kScenes = 200;
   double nees = 0.0;
   int within_95 = 0;
   for (unsigned seed = 0; seed < kScenes; ++seed) {
@@ -83,9 +83,9 @@ TEST_P(CovarianceTest, IsThatOfTheErrorOverManyScenes) {
     nees += squared / kScenes;
     within_95 += squared < kChiSquared95Dof6 ? 1 : 0;
   }
-  // The mean of 400 draws of a chi-squared of 6 degrees of freedom has a sigma of 0.17.
-  EXPECT_GT(nees, 5.0);
-  EXPECT_LT(nees, 7.0);
+  // The mean of 200 draws of a chi-squared of 6 degrees of freedom has a sigma of 0.24.
+  EXPECT_GT(nees, 5.2);
+  EXPECT_LT(nees, 6.8);
   EXPECT_GT(within_95, 0.91 * kScenes);
   EXPECT_LT(within_95, 0.98 * kScenes);
 }
@@ -122,7 +122,7 @@ TEST(CameraPoseEstimatorTest, FindsTheSamePoseFromAnotherSeed) {
 }
 
 TEST(CameraPoseEstimatorTest, FindsNoPoseInGarbage) {
-  for (unsigned seed = 0; seed < 100; ++seed) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
     const Scene scene = MakeScene({.outlier_share = 1.0}, seed);
     EXPECT_NE(Estimate(scene, seed).status, CameraPoseStatus::kOk) << "seed " << seed;
   }
@@ -275,9 +275,9 @@ TEST(CameraPoseOptionsTest, NamesTheFieldThatIsOutOfRange) {
   EXPECT_THAT(options.Validate().error().message,
               HasSubstr("hypotheses is 0, must be in [1, 10000]"));
   options = {};
-  options.inlier_threshold_px = NAN;
+  options.inlier_threshold_mrad = NAN;
   EXPECT_THAT(options.Validate().error().message,
-              HasSubstr("inlier_threshold_px is nan, must be in [0.1, 1000]"));
+              HasSubstr("inlier_threshold_mrad is nan, must be in [0.1, 1000]"));
   options = {};
   options.max_sigma_t_m = 0.0;
   EXPECT_THAT(options.Validate().error().message, HasSubstr("max_sigma_t_m is 0, must be > 0"));
