@@ -28,7 +28,8 @@ Result<void> ApplyOverride(const std::string& text, YAML::Node root) {
     const auto dot = keys.find('.');
     const std::string key(keys.substr(0, dot));
     if (dot == std::string_view::npos) {
-      node[key] = YAML::Load(text.substr(equals + 1));
+      const std::string value = text.substr(equals + 1);
+      node[key] = value.empty() ? YAML::Node("") : YAML::Load(value);
       return {};
     }
     if (!node[key].IsDefined() || node[key].IsNull()) node[key] = YAML::Node(YAML::NodeType::Map);

@@ -126,6 +126,7 @@ TEST(YamlReaderTest, OverridesGoOverTheFile) {
   ASSERT_TRUE(robot) << robot.error().message;
   EXPECT_EQ(robot->wheel.radius_m, 0.4);
   EXPECT_EQ(robot->wheels.at("left").signal, "X.Y");
+  EXPECT_EQ(Read("", {"wheel.signal="}).value().wheel.signal, "");
   EXPECT_THAT(Read("", {"wheel"}).error().message, HasSubstr("--set wheel"));
   EXPECT_THAT(Read("", {"count.x=1"}).has_value(), false);
 }
