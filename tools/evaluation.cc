@@ -52,9 +52,9 @@ void Match(const std::vector<EvaluatedPose>& estimates,
   for (const EvaluatedPose& pose : evaluation.truths)
     truth.push_back({pose.time_ns, pose.X_WB});
   for (const EvaluatedPose& pose : estimates) {
-    const auto X_WB_true = Interpolate(truth, pose.time_ns, options.max_gap_ns);
-    if (X_WB_true) {
-      evaluation.pairs.push_back({pose.time_ns, *X_WB_true, pose.X_WB});
+    const auto true_pose = Interpolate(truth, pose.time_ns, options.max_gap_ns);
+    if (true_pose) {
+      evaluation.pairs.push_back({pose.time_ns, *true_pose, pose.X_WB});
       evaluation.estimates.push_back(pose);
     } else if (truth.empty() || pose.time_ns < truth.front().time_ns ||
                pose.time_ns > truth.back().time_ns) {
@@ -115,11 +115,11 @@ void MeasureCoverage(Evaluation& evaluation) {
     if (!covariance) continue;
     const Eigen::Matrix2d position = covariance->topLeftCorner<2, 2>();
     const Pose2 X_WB = ProjectToPlane(evaluation.pairs[i].X_WB);
-    const Pose2 X_WB_true = ProjectToPlane(evaluation.pairs[i].X_WB_true);
+    const Pose2 true_pose = ProjectToPlane(evaluation.pairs[i].X_WB_true);
     if (evaluation.has_heading) {
-      counter.Add((X_WB.Inverse() * X_WB_true).Log(), *covariance);
+      counter.Add((X_WB.Inverse() * true_pose).Log(), *covariance);
     } else {
-      counter.AddPosition(X_WB.Inverse() * X_WB_true.translation(), position);
+      counter.AddPosition(X_WB.Inverse() * true_pose.translation(), position);
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(position);
     sigmas.push_back(std::sqrt(axes.eigenvalues()[1]));

@@ -74,9 +74,9 @@ Result<Pose3> AlignPoints(std::span<const Eigen::Vector3d> p_APs,
   }
   // A mirror image is no rotation: turn the least certain axis round.
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0.0 ? -1.0 : 1.0;
-  const Eigen::Matrix3d R =
+  const Eigen::Matrix3d R_AB =
       svd.matrixU() * Eigen::Vector3d(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
-  return Pose3(R, cross.centre_A - R * cross.centre_B);
+  return Pose3(R_AB, cross.centre_A - R_AB * cross.centre_B);
 }
 
 }  // namespace relocd

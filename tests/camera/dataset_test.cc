@@ -1,5 +1,6 @@
 #include "camera/dataset.h"
 
+#include <random>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -154,6 +155,23 @@ INSTANTIATE_TEST_SUITE_P(
                 "1 a.jpg test\n1 b.jpg train",
                 "s.txt: line 2: index 1 came before, must be new"}),
     [](const auto& instance) { return instance.param.name; });
+
+TEST(ParseSplitTest, AnyTextIsAnErrorOrASplit) {
+  const std::string split = "0 images/a.jpg train\n1 images/b.jpg test  # comment\n";
+  const std::string intrinsics = "500 501 320 240 640 480 0.1 0.2 0.3 0.4 0.5\n";
+  std::mt19937 engine(9);  // the same texts in every run
+  int refused = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    for (std::string text : {split, intrinsics}) {
+      std::uniform_int_distribution<std::size_t> position(0, text.size() - 1);
+      for (int change = 0; change <= trial % 4; ++change)
+        text[position(engine)] = static_cast<char>(engine() & 0xFFU);
+      if (!ParseSplit(text, "s.txt")) ++refused;
+      if (!ParseIntrinsics(text, "i.txt")) ++refused;
+    }
+  }
+  EXPECT_GT(refused, 4000);  // each text is at least not of the other form
+}
 
 TEST(RealDatasetTest, KittiIsReadWhole) {
   const std::string folder = SharedData("kitti00_head");
