@@ -44,7 +44,7 @@ float NormaliseHistogram(std::span<float> histogram) {
 Result<void> Validate(const GradientHistogramsConfig& config) {
   constexpr int kMaxSide = 8192;
   constexpr int kMinWorkingSide = 64;
-  constexpr int kMaxOctaves = 4;
+  constexpr int kMaxOctaves = 5;
   using Rule = std::tuple<const char*, int, int, int>;
   for (const auto& [field, value, low, high] :
        {Rule{"image_width", config.image_width, 16, kMaxSide},

@@ -14,7 +14,7 @@ struct GradientHistogramsConfig {
   int working_width = 0;  ///< Images are resized to this; small images gain from being enlarged.
   int working_height = 0;
   int cell_stride = 8;  ///< Distance between cell centres, in working pixels.
-  int octaves = 3;      ///< Each sees twice the surroundings of the one before.
+  int octaves = 5;      ///< Each sees twice the surroundings of the one before.
 };
 
 /// Gradient orientations of one image, smoothed, at several octaves: where DAISY descriptors are

@@ -1,0 +1,118 @@
+#include "scene_coordinates/training_set.h"
+
+#include <cstring>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "scene_coordinates/head_trainer.h"
+#include "scene_coordinates/map_file.h"
+#include "scene_coordinates/scene_coordinate_predictor.h"
+#include "scene_coordinates/wall_scene.h"
+
+namespace relocd {
+namespace {
+
+using testing::HasSubstr;
+
+TrainingSetConfig TestConfig() {
+  TrainingSetConfig config;
+  config.cells_per_view = 400;
+  config.views_per_image = 2;
+  config.whitened_dimensions = 48;
+  return config;
+}
+
+Result<PreparedTraining> Prepare(const std::vector<TrainingImage>& images,
+                                 const TrainingSetConfig& config) {
+  const PinholeCamera camera(WallScene::Intrinsics());
+  return PrepareTraining(images, camera, WallScene::Features(), config, {});
+}
+
+TEST(TrainingSetTest, KnowsWhereEachCellLooksAlsoInChangedCopies) {
+  const std::vector<TrainingImage> images = WallScene().Drive(6);
+  const auto prepared = Prepare(images, TestConfig());
+  ASSERT_TRUE(prepared) << prepared.error().message;
+  const TrainingSet& set = prepared->set;
+  EXPECT_EQ(set.features.size(), set.targets.size() * 48);
+  EXPECT_GT(set.targets.size(), 6U * 400U);
+  EXPECT_NEAR(set.typical_depth_m, 8.2, 0.5);
+  int known = 0;
+  int right = 0;
+  for (const TrainingTarget& target : set.targets) {
+    if (target.inverse_depth == 0.0F) continue;
+    ++known;
+    const double depth = WallScene::Depth(images[target.image].X_WC, {target.x, target.y});
+    if (std::abs(depth * static_cast<double>(target.inverse_depth) - 1.0) < 0.1) ++right;
+  }
+  EXPECT_GT(known, static_cast<int>(set.targets.size()) / 3);
+  EXPECT_GT(right, known * 8 / 10);
+}
+
+TEST(TrainingSetTest, TheNumberOfThreadsDoesNotChangeTheSet) {
+  const std::vector<TrainingImage> images = WallScene().Drive(4);
+  TrainingSetConfig config = TestConfig();
+  const auto one = Prepare(images, config);
+  config.threads = 3;
+  const auto three = Prepare(images, config);
+  ASSERT_TRUE(one && three);
+  ASSERT_EQ(one->set.features.size(), three->set.features.size());
+  EXPECT_EQ(std::memcmp(one->set.features.data(),
+                        three->set.features.data(),
+                        one->set.features.size() * sizeof(Bfloat16)),
+            0);
+  EXPECT_EQ(one->whitening.basis, three->whitening.basis);
+}
+
+TEST(TrainingSetTest, RefusesAnImageOfAnotherSize) {
+  std::vector<TrainingImage> images = WallScene().Drive(3);
+  images[2].image = Texture(1).Image(64, 64);
+  const auto prepared = Prepare(images, TestConfig());
+  ASSERT_FALSE(prepared);
+  EXPECT_THAT(prepared.error().message,
+              HasSubstr("training image 2 is 64 x 64 pixels, must be 240 x 160"));
+}
+
+/// The whole way: a map is made of a drive along the wall, and finds points in a view between.
+TEST(SceneCoordinatePredictorTest, FindsThePointsOfAViewThatWasNotTrained) {
+  const WallScene wall;
+  const auto prepared = Prepare(wall.Drive(8), TestConfig());
+  ASSERT_TRUE(prepared);
+  HeadTrainerConfig trainer;
+  trainer.shape = {.inputs = 48, .width = 64, .blocks = 1};
+  trainer.iterations = 400;
+  trainer.batch = 512;
+  auto head = TrainHead(prepared->set, trainer, {});
+  ASSERT_TRUE(head) << head.error().message;
+  SceneMap map;
+  map.camera = WallScene::Intrinsics();
+  map.features = WallScene::Features();
+  map.cells_per_image = 200;
+  map.whitening = prepared->whitening;
+  map.regions.emplace_back().head = std::move(*head);
+
+  const TrainingImage view = wall.View(Pose3(Eigen::Quaterniond::Identity(), {1.4, 0.05, 0.0}));
+  auto predictor = SceneCoordinatePredictor::Create(map, 1);
+  ASSERT_TRUE(predictor);
+  ASSERT_TRUE((*predictor)->Extract(view.image));
+  const auto predictions = (*predictor)->Predict(0);
+  ASSERT_EQ(predictions.size(), 200U);
+  const PinholeCamera camera(map.camera);
+  std::vector<double> errors_m;
+  for (const ScenePrediction& prediction : predictions) {
+    const Eigen::Vector2d ray = *camera.Unproject(prediction.pixel);
+    const Eigen::Vector3d p_CP =
+        WallScene::Depth(view.X_WC, ray) * Eigen::Vector3d(ray.x(), ray.y(), 1.0);
+    errors_m.push_back((prediction.p_WP - view.X_WC * p_CP).norm());
+  }
+  std::nth_element(errors_m.begin(), errors_m.begin() + 100, errors_m.end());
+  EXPECT_LT(errors_m[100], 0.5);
+
+  const auto refused = (*predictor)->Extract(Texture(1).Image(64, 64));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("must be 240 x 160"));
+}
+
+}  // namespace
+}  // namespace relocd
