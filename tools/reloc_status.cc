@@ -52,13 +52,16 @@ int main(int argc, char** argv) {
   double wait_s = 0.0;
   std::string url = relocd::BusConfig().control_url;
   app.add_flag("--json", json, "for scripts");
-  app.add_option("--wait", wait_s, "seconds to wait until all is well")
-      ->check(CLI::Range(0.0, 86400.0));
+  app.add_option("--wait", wait_s, "seconds to wait until all is well, in [0, 86400]");
   app.add_option("--lcm-url", url, "the control network")->capture_default_str();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? relocd::kExitOk : relocd::kExitUsage;
+  }
+  if (!(wait_s >= 0.0 && wait_s <= 86400.0)) {
+    fmt::print(stderr, "reloc status: --wait is {}, must be in [0, 86400]\n", wait_s);
+    return relocd::kExitUsage;
   }
   auto bus = relocd::LcmBus::Open(url);
   if (!bus) {

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <type_traits>
+
+#include <fmt/format.h>
 
 #include "config/yaml_writer.h"
 
@@ -21,9 +22,22 @@ constexpr std::array<SectionReader, 6> kReaders{{
     {"odometry", "odometryd"},
     {"inference", "inferenced"},
     {"recorder", "recorderd"},
-    {"smoother", "smootherd"},
+    {"localization", "smootherd"},
     {"supervisor", ""},
 }};
+
+template <ConfigStruct Section>
+std::string TextOf(const Section& section) {
+  return YamlWriter::Write(section);
+}
+
+template <typename Value>
+std::string TextOf(const std::map<std::string, Value>& sections) {
+  std::string text;
+  for (const auto& [name, section] : sections)
+    text += fmt::format("{}:\n{}", name, TextOf(section));
+  return text;
+}
 
 bool IsDaemon(std::string_view process) {
   constexpr std::array<std::string_view, 4> kDaemons{
@@ -45,16 +59,10 @@ bool Concerns(std::string_view section, std::string_view process) {
 
 ConfigSections::ConfigSections(const Config& config) {
   Config::VisitFields(config, [this](const char* name, const auto& section, const char*) {
-    if constexpr (ConfigStruct<std::remove_cvref_t<decltype(section)>>) {
-      sections_[name] = YamlWriter::Write(section);
-    } else if constexpr (requires { section.begin()->second; }) {
-      for (const auto& [key, value] : section) {
-        const std::string text = YamlWriter::Write(value);
-        sections_[name] += key + ":\n" + text;
-        if (std::string_view(name) == "cameras") cameras_[key] = text;
-      }
-    }
+    sections_[name] = TextOf(section);
   });
+  for (const auto& [name, camera] : config.cameras)
+    cameras_[name] = TextOf(camera);
 }
 
 std::vector<std::string> ConfigSections::CameraNames() const {
@@ -68,7 +76,7 @@ std::string ConfigSections::ReadBy(std::string_view process) const {
   std::string read;
   if (!IsDaemon(process)) return read;
   for (const auto& [name, text] : sections_) {
-    if (Concerns(name, process)) read += name + ":\n" + text;
+    if (Concerns(name, process)) read += fmt::format("{}:\n{}", name, text);
   }
   if (process.starts_with(kCameraDaemon)) {
     const auto camera = cameras_.find(std::string(process.substr(kCameraDaemon.size())));

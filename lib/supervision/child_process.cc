@@ -97,7 +97,7 @@ class Launcher {
       ::sigaction(signal, &action, nullptr);  // refused for some, which keep their default anyway
     sigset_t none;
     ::sigemptyset(&none);
-    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    ::pthread_sigmask(SIG_SETMASK, &none, nullptr);
   }
 
   static void Report(int fd, LaunchReport::Step step) {

@@ -30,6 +30,12 @@ TEST(ConfigSectionsTest, TheRecordersSectionConcernsTheRecorder) {
   EXPECT_THAT(Concerned(config), testing::ElementsAre("recorderd"));
 }
 
+TEST(ConfigSectionsTest, TheSmoothersSectionConcernsTheSmoother) {
+  Config config;
+  config.localization.state_period_s += 1.0;
+  EXPECT_THAT(Concerned(config), testing::ElementsAre("smootherd"));
+}
+
 TEST(ConfigSectionsTest, ACameraConcernsItsOwnCameradAndWhoNeedsItsGeometry) {
   Config config;
   config.cameras["front"].X_BC_translation_m[0] += 0.1;
