@@ -13,7 +13,9 @@
 #include "core/exit_code.h"
 #include "log_csv.h"
 #include "log_summary.h"
+#include "messaging/in_process_bus.h"
 #include "recording/log_reader.h"
+#include "status_report.h"
 
 // reloc log: what is in a recording, and its messages as tables.
 
@@ -29,6 +31,26 @@ Result<int> Info(const std::string& path, bool json) {
   fmt::print(
       "{}",
       json ? summary.FormatJson(reader->counters()) : summary.FormatTable(reader->counters()));
+  return kExitOk;
+}
+
+/// What the daemons last said of themselves.
+Result<int> LastStatus(const std::string& path, bool json) {
+  auto reader = LogReader::Open(path);
+  if (!reader) return std::move(reader).error();
+  InProcessBus bus;
+  StatusReport report;
+  report.Subscribe(bus);
+  MonotonicTime now{};
+  bus.Subscribe<timesync_t>(
+      channels::kTimesync, Delivery::kEvery, [&now](const timesync_t& message) {
+        now = FromNanoseconds(message.mono_ns);
+      });
+  while (const auto event = reader->Next()) {
+    if (auto ok = bus.PublishBytes(event->channel, event->data); !ok) return std::move(ok).error();
+    bus.HandlePending();
+  }
+  fmt::print("{}", json ? report.Json(now) : report.Text(now));
   return kExitOk;
 }
 
@@ -81,6 +103,10 @@ int main(int argc, char** argv) {
   info->add_option("log", path, "a log of lcm-logger or recorderd")->required();
   info->add_flag("--json", json, "for scripts");
 
+  auto* status = app.add_subcommand("status", "what the daemons last said of themselves");
+  status->add_option("log", path, "a log of lcm-logger or recorderd")->required();
+  status->add_flag("--json", json, "for scripts");
+
   relocd::ExportOptions options;
   auto* exporting = app.add_subcommand("export", "one channel as CSV");
   exporting->add_option("log", options.log, "a log of lcm-logger or recorderd")->required();
@@ -93,5 +119,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? relocd::kExitOk : relocd::kExitUsage;
   }
-  return relocd::Finish(*info ? relocd::Info(path, json) : relocd::Export(options));
+  if (*info) return relocd::Finish(relocd::Info(path, json));
+  if (*status) return relocd::Finish(relocd::LastStatus(path, json));
+  return relocd::Finish(relocd::Export(options));
 }

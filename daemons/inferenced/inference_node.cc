@@ -123,7 +123,8 @@ void InferenceNode::Handle(const std::string& camera, const image_t& image) {
     answer.image_seq = metadata->seq;
     answer.image_run_id = metadata->run_id;
     const Duration age = start.monotonic - FromNanoseconds(metadata->mono_ns);
-    if (age > std::chrono::milliseconds(config_.max_image_age_ms)) {
+    const std::chrono::milliseconds max_age(config_.max_image_age_ms);
+    if (max_age.count() > 0 && age > max_age) {
       ++counters_.too_old;
       return;
     }

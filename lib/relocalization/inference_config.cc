@@ -9,9 +9,9 @@ Result<void> InferenceConfig::Validate() const {
     return Error{ErrorKind::kInvalidInput,
                  fmt::format("threads is {}, must be in [1, 64]", threads)};
   }
-  if (max_image_age_ms < 1 || max_image_age_ms > 60000) {
+  if (max_image_age_ms < 0 || max_image_age_ms > 60000) {
     return Error{ErrorKind::kInvalidInput,
-                 fmt::format("max_image_age_ms is {}, must be in [1, 60000]", max_image_age_ms)};
+                 fmt::format("max_image_age_ms is {}, must be in [0, 60000]", max_image_age_ms)};
   }
   if (auto ok = pose.Validate(); !ok) {
     return Error{ErrorKind::kInvalidInput, "pose." + ok.error().message};

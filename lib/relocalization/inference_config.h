@@ -20,7 +20,8 @@ struct InferenceConfig {
     visit("threads", self.threads, "in [1, 64]; of the network");
     visit("max_image_age_ms",
           self.max_image_age_ms,
-          "in [1, 60000]; older images are passed over, and counted");
+          "in [0, 60000]; older images are passed over, and counted; 0: none is too old, as when "
+          "lcm-logplayer plays an old log");
     visit("pose", self.pose, "The search for the pose in the scene coordinates.");
   }
 
