@@ -1,0 +1,230 @@
+#!/usr/bin/env python3
+"""chain_test.py SOURCE BUILD WORK CASE: the whole product as processes over LCM, on a generated street.
+
+Runs in a network of its own (tests/integration/in_network). `setup` makes the data set, the map and the CAN log; `live` drives and leaves
+its log for `replay` and `logplayer`; `kill` ends each child in turn; `messages` tries bad input on every program.
+"""
+
+import csv
+import json
+import os
+import pathlib
+import re
+import signal
+import statistics
+import subprocess
+import sys
+import time
+
+SOURCE, BUILD, WORK = (pathlib.Path(argument).resolve() for argument in sys.argv[1:4])
+BIN = BUILD / "bin"
+STREET = WORK / "street"
+MAP = WORK / "street.relocmap"
+CAN_LOG = WORK / "can0.log"
+TRUTH = WORK / "truth_body.csv"
+VEHICLE = SOURCE / "config/vehicles/differential_demo.yaml"
+FRAMES = 150
+
+
+def run(*command, **options):
+    print("+", *command, flush=True)
+    return subprocess.run([str(word) for word in command], check=True, **options)
+
+
+def output_of(*command):
+    return run(*command, stdout=subprocess.PIPE, text=True).stdout
+
+
+def check(condition, what):
+    print("ok  " if condition else "FAIL", what, flush=True)
+    if not condition:
+        sys.exit(1)
+
+
+def setup():
+    WORK.mkdir(parents=True, exist_ok=True)
+    run(BIN / "make_street", STREET)
+    run(BIN / "reloc", "sim", "wheels", "--trajectory", STREET / "planar_truth.csv", "--camera-forward-m", "1.03", "--config", VEHICLE,
+        "--seed", "1", "--rate-hz", "100", "--out", CAN_LOG, "--truth", TRUTH)
+    run(BIN / "reloc", "map", "train", "--dataset", STREET, "--split", STREET / "split_every5.txt", "--out", MAP, "--threads", os.cpu_count(),
+        "--iterations", "400", "--views", "2")
+
+
+def play(out, *beside):
+    command = [SOURCE / "tools/play-dataset", "--bin", BIN, "--dataset", STREET, "--map", MAP, "--can", CAN_LOG, "--vehicle", VEHICLE, "--out", out]
+    run(*command, *(["--", *beside] if beside else []))
+    print((out / "relocd.log").read_text(), flush=True)
+    logs = sorted((out / "log").glob("*.lcmlog"))
+    check(logs, "the recorder left a log")
+    return logs
+
+
+def localization(log, out, channel="LOCALIZATION"):
+    table = out / f"{channel}.csv"
+    epoch = (WORK / "live/epoch_ns").read_text().strip() if not (out / "epoch_ns").exists() else (out / "epoch_ns").read_text().strip()
+    run(BIN / "reloc", "log", "export", log, "--channel", channel, "--time-origin-ns", epoch, "--out", table)
+    return table
+
+
+def mean_error_m(table):
+    report = json.loads(output_of(BIN / "reloc", "eval", "--truth", TRUTH, "--estimate", table, "--json"))
+    return report["position_m"]["mean"]
+
+
+def live():
+    out = WORK / "live"
+    (log,) = play(out)
+    print(output_of(BIN / "reloc", "log", "info", log), flush=True)
+    channels = json.loads(output_of(BIN / "reloc", "log", "info", log, "--json"))["channels"]
+    check(channels["IMAGE_front"]["events"] == FRAMES, "every image of the data set was published")
+    check(all(channel["lost"] == 0 for channel in channels.values()), "no message was lost on any channel")
+    check(channels["ODOMETRY"]["events"] >= 1491, "one ODOMETRY for each set of wheels in the CAN log")
+    check(channels["LOCALIZATION"]["events"] == channels["ODOMETRY"]["events"], "one LOCALIZATION for each ODOMETRY")
+
+    daemons = json.loads(output_of(BIN / "reloc", "log", "status", log, "--json"))["daemons"]
+    inference = next(daemon for daemon in daemons if daemon["daemon"] == "inferenced")["values"]
+    accounted = inference["images"] + inference["IMAGE_front_superseded"]
+    check(accounted == FRAMES, f"inferenced accounts for every image: {inference['images']} seen, {inference['IMAGE_front_superseded']} superseded")
+    check(inference["poses"] >= 0.3 * FRAMES, f"{inference['poses']} camera poses")
+
+    error_m = mean_error_m(localization(log, out))
+    check(error_m < 1.5, f"mean error of the live pose is {error_m:.3f} m")
+
+
+def live_log():
+    return sorted((WORK / "live/log").glob("*.lcmlog"))[0]
+
+
+def replay():
+    out = WORK / "replay"
+    out.mkdir(exist_ok=True)
+    for name in ("first", "second"):
+        run(BIN / "reloc", "replay", "--log", live_log(), "--out", out / f"{name}.lcmlog", "--config", WORK / "live/robot.yaml",
+            "--nodes", "odometry,inference,smoothing")
+    check((out / "first.lcmlog").read_bytes() == (out / "second.lcmlog").read_bytes(), "two replays give the same bytes")
+    error_m = mean_error_m(localization(out / "first.lcmlog", out))
+    check(error_m < 1.5, f"mean error of the replayed pose is {error_m:.3f} m")
+
+
+def logplayer():
+    """The recorded images and odometry, played by LCM's own tool, drive inferenced and smootherd."""
+    out = WORK / "logplayer"
+    (out / "log").mkdir(parents=True, exist_ok=True)
+    for old in (out / "log").glob("*"):
+        old.unlink()
+    options = ["--config", WORK / "live/robot.yaml", "--set", f"recorder.directory={out / 'log'}", "--set", "inference.max_image_age_ms=0",
+               "--set", f"localization.state_file={out / 'smootherd.state'}"]
+    daemons = [subprocess.Popen([str(word) for word in (BIN / name, *options)]) for name in ("recorderd", "smootherd", "inferenced")]
+    time.sleep(3.0)
+    urls = {"IMAGE_.*": "udpm://239.255.76.67:7668?ttl=0", "ODOMETRY": "udpm://239.255.76.67:7667?ttl=0"}
+    players = [subprocess.Popen(["lcm-logplayer", "-e", channels, "-l", url, str(live_log())]) for channels, url in urls.items()]
+    for player in players:
+        player.wait()
+    time.sleep(2.0)
+    for daemon in reversed(daemons):
+        daemon.send_signal(signal.SIGTERM)
+        check(daemon.wait(timeout=10) == 0, "a daemon ends with 0 on SIGTERM")
+    (log,) = (out / "log").glob("*.lcmlog")
+    print(output_of(BIN / "reloc", "log", "info", log), flush=True)
+    error_m = mean_error_m(localization(log, out))
+    check(error_m < 1.5, f"mean error of the pose from lcm-logplayer is {error_m:.3f} m")
+
+
+def child_pids(relocd):
+    """The children's pids by name; camerad_front is called camerad."""
+    children = {}
+    for pid in pathlib.Path(f"/proc/{relocd}/task/{relocd}/children").read_text().split():
+        try:
+            children[pathlib.Path(f"/proc/{pid}/comm").read_text().strip()] = int(pid)
+        except FileNotFoundError:
+            pass
+    return children
+
+
+def kill_children():
+    """Runs beside relocd: kills each child in turn, and writes how long each took to come back."""
+    relocd = os.environ["RELOCD_PID"]
+    time.sleep(5.0)
+    seconds = {}
+    for name in ("recorderd", "odometryd", "camerad", "inferenced", "smootherd"):
+        old = child_pids(relocd)[name]
+        os.kill(old, signal.SIGKILL)
+        begin = time.monotonic()
+        while child_pids(relocd).get(name, old) == old and time.monotonic() - begin < 5.0:
+            time.sleep(0.01)
+        seconds[name] = time.monotonic() - begin
+        time.sleep(1.2)
+    (WORK / "kill/seconds.json").write_text(json.dumps(seconds))
+
+
+def kill():
+    out = WORK / "kill"
+    out.mkdir(exist_ok=True)
+    logs = play(out, sys.executable, __file__, SOURCE, BUILD, WORK, "kill_children")
+    seconds = json.loads((out / "seconds.json").read_text())
+    for name, duration in seconds.items():
+        check(duration < 1.0, f"{name} was killed and runs again after {duration:.2f} s")
+    check(len(logs) == 2, "the recorder's second run began a file of its own")
+    rows = []
+    for log in logs:
+        with open(localization(log, out)) as table:
+            rows += [(int(row["time_ns"]), float(row["x_m"]), float(row["y_m"])) for row in csv.DictReader(table)]
+    rows.sort()
+    gaps_s = [(b[0] - a[0]) * 1e-9 for a, b in zip(rows, rows[1:])]
+    check(max(gaps_s) < 1.5, f"the pose goes on: no gap above {max(gaps_s):.2f} s")
+    error_m = statistics.mean(mean_error_m(localization(log, out)) for log in logs)
+    check(error_m < 2.0, f"mean error over all five kills is {error_m:.3f} m")
+
+
+def expect_refusal(code, pattern, *command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=20)
+    said = done.stderr.strip().splitlines()[-1] if done.stderr.strip() else ""
+    check(done.returncode == code and re.search(pattern, done.stderr), f"exit {done.returncode} (expected {code}): {said}")
+
+
+def messages():
+    """Bad input ends in one line that says what, where and what is allowed, and in an exit code that a script can use."""
+    out = WORK / "messages"
+    out.mkdir(exist_ok=True)
+
+    def write(name, content):
+        path = out / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    reloc, robot = BIN / "reloc", WORK / "live/robot.yaml"
+    expect_refusal(78, r"broken.yaml: line \d+", reloc, "check-config", write("broken.yaml", "bus: {control_url: 'x\n"))
+    expect_refusal(78, r"unknown.yaml: line 2: unknown key 'recorder.directry', did you mean 'directory'", BIN / "recorderd", "--config",
+                   write("unknown.yaml", "recorder:\n  directry: /x\n"))
+    expect_refusal(78, r"range.yaml: line 2: recorder.flush_s is -1, must be in", BIN / "relocd", "--config", write("range.yaml", "recorder:\n  flush_s: -1\n"))
+    expect_refusal(2, r"--nonsense", BIN / "smootherd", "--nonsense")
+    expect_refusal(2, r"mpa", reloc, "mpa")
+
+    bytes_of_map = MAP.read_bytes()
+    inferenced = [BIN / "inferenced", "--config", robot, "--set"]
+    expect_refusal(78, r"missing.relocmap", *inferenced, f"inference.map_path={out / 'missing.relocmap'}")
+    truncated = write("truncated.relocmap", bytes_of_map[: len(bytes_of_map) // 2])
+    expect_refusal(78, r"truncated.relocmap", *inferenced, f"inference.map_path={truncated}")
+    version = write("version.relocmap", bytes_of_map[:8] + b"\xff" + bytes_of_map[9:])
+    expect_refusal(78, r"version.relocmap.*version", *inferenced, f"inference.map_path={version}")
+    damaged = write("damaged.relocmap", bytes_of_map[:-100] + bytes(100))
+    expect_refusal(78, r"damaged.relocmap", *inferenced, f"inference.map_path={damaged}")
+
+    vehicle = VEHICLE.read_text()
+    dbc = VEHICLE.with_name("differential_demo.dbc")
+    no_signal = write("no_signal.yaml", vehicle.replace("differential_demo.dbc", str(write("no_signal.dbc", dbc.read_text().replace("SG_ ", "SG_ X")))))
+    odometry = [reloc, "odometry", "--out", out / "odo.csv", "--config"]
+    expect_refusal(78, r"no_signal.dbc.*did you mean", *odometry, no_signal, "--can", CAN_LOG)
+    expect_refusal(78, r"bad_candump.log: line 2", *odometry, VEHICLE, "--can", write("bad_candump.log", "(0.1) can0 1A0#00\nhello\n"))
+
+    smooth = [reloc, "smooth", "--out", out / "est.csv", "--odometry"]
+    odometry_csv = write("odometry.csv", "time_ns,dx_m,dy_m,dtheta_rad\n0,0,0,0\n100,1,0,0\n")
+    fixes = "time_ns,x_m,y_m\n"
+    expect_refusal(78, r"header.csv: line 1: the header has no column 'x_m'", *smooth, odometry_csv, "--fixes", write("header.csv", "time_ns,x,y\n0,0,0\n"))
+    expect_refusal(78, r"nan.csv: line 3: x_m is 'nan'", *smooth, odometry_csv, "--fixes", write("nan.csv", fixes + "0,0,0\n50,nan,0\n"))
+    expect_refusal(78, r"order.csv: line 3", *smooth, write("order.csv", "time_ns,dx_m,dy_m,dtheta_rad\n100,0,0,0\n50,1,0,0\n"), "--fixes",
+                   write("fixes.csv", fixes + "0,0,0\n"))
+
+
+if __name__ == "__main__":
+    globals()[sys.argv[4]]()
