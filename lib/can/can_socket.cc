@@ -183,7 +183,7 @@ Result<std::optional<CanFrame>> CanSocket::Receive() {
     CanFrame frame = FrameFromRaw(raw, static_cast<std::size_t>(size));
     frame.receive_time = ToMonotonic(metadata, last_receive_time_);
     last_receive_time_ = frame.receive_time;
-    if (auto wanted = HandleFrame(std::move(frame))) return wanted;
+    if (auto wanted = HandleFrame(frame)) return wanted;
   }
 }
 
@@ -199,7 +199,7 @@ Result<std::optional<CanFrame>> CanSocket::HandleReceiveError(int error) {
   return SystemError(ErrorKind::kUnavailable, "receiving from the CAN bus");
 }
 
-std::optional<CanFrame> CanSocket::HandleFrame(CanFrame frame) {
+std::optional<CanFrame> CanSocket::HandleFrame(const CanFrame& frame) {
   if (frame.error) {
     HandleErrorFrame(frame);
     return std::nullopt;

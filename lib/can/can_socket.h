@@ -53,7 +53,7 @@ class CanSocket {
   /// A failed recvmsg: nothing where frames may still come.
   Result<std::optional<CanFrame>> HandleReceiveError(int error);
   /// A frame that was received whole: nothing for one that is only counted.
-  std::optional<CanFrame> HandleFrame(CanFrame frame);
+  std::optional<CanFrame> HandleFrame(const CanFrame& frame);
   void HandleErrorFrame(const CanFrame& frame);
 
   UniqueFd fd_;

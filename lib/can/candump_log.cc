@@ -201,9 +201,11 @@ Result<std::optional<CandumpRecord>> CandumpLog::Next() {
     const std::string_view text = Trim(line);
     if (text.empty() || text.starts_with('#')) continue;
     auto record = ParseCandumpLine(text);
-    auto ok = record ? CheckOrder(*record) : Result<void>(std::move(record).error());
-    if (!ok) {
-      return std::move(ok).error().WithContext(fmt::format("{}: line {}", path_, line_number_));
+    if (record) {
+      if (auto ok = CheckOrder(*record); !ok) record = std::move(ok).error();
+    }
+    if (!record) {
+      return std::move(record).error().WithContext(fmt::format("{}: line {}", path_, line_number_));
     }
     return std::optional(std::move(record).value());
   }
