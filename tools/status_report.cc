@@ -159,12 +159,13 @@ std::string ProblemOf(const process_t& process) {
   } else if (process.last_exit_code >= 0) {
     problem += fmt::format(" (ended with exit code {})", process.last_exit_code);
   }
-  if (process.state == process_t::FAILED) {
-    problem +=
-        ": its input is wrong, see journalctl -u relocd; mend it, then systemctl reload "
-        "relocd";
+  const bool has_failed = process.state == process_t::FAILED;
+  if (!process.status_text.empty()) {
+    problem += ": " + process.status_text;
+  } else if (has_failed) {
+    problem += ": its input is wrong, see journalctl -u relocd";
   }
-  if (!process.status_text.empty()) problem += ": " + process.status_text;
+  if (has_failed) problem += "; mend it, then systemctl reload relocd";
   return problem;
 }
 

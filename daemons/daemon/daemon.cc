@@ -125,6 +125,13 @@ class Frame {
   std::unique_ptr<LcmBus> image_bus_;
 };
 
+/// Says why the daemon ends, on stderr and to who started it, so that `reloc status` can show it.
+int Refuse(const std::string& name, const Error& error) {
+  LogLine(kPriorityError, name, error.message);
+  ServiceManager::FromEnvironment().Status(error.message);
+  return ExitCode(error);
+}
+
 }  // namespace
 
 int RunDaemon(int argc,
@@ -135,15 +142,13 @@ int RunDaemon(int argc,
   if (const auto exit_code = ParseCommandLine(argc, argv, info, options)) return *exit_code;
   const auto config = LoadConfig(options.config_path, options.overrides);
   if (!config) {
-    LogLine(kPriorityError, info.name, config.error().message);
-    return ExitCode(config.error());
+    return Refuse(info.name, config.error());
   }
   if (options.print_config) fmt::print("{}", FormatConfig(*config));
   if (options.check_config || options.print_config) return kExitOk;
 
   if (auto ok = Frame(*config, info, options).Run(info, make); !ok) {
-    LogLine(kPriorityError, info.name, ok.error().message);
-    return ExitCode(ok.error());
+    return Refuse(info.name, ok.error());
   }
   return kExitOk;
 }

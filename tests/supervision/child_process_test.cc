@@ -7,7 +7,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <filesystem>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -15,6 +14,7 @@
 
 #include "core/file.h"
 #include "core/parse_number.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -23,13 +23,6 @@ using testing::HasSubstr;
 
 class ChildProcessTest : public testing::Test {
  protected:
-  ChildProcessTest() : log_(testing::TempDir() + "relocd_child_" + std::to_string(::getpid())) {
-    std::filesystem::remove(log_);
-  }
-  ~ChildProcessTest() override { std::filesystem::remove(log_); }
-  ChildProcessTest(const ChildProcessTest&) = delete;
-  ChildProcessTest& operator=(const ChildProcessTest&) = delete;
-
   [[nodiscard]] LaunchOptions TestChild(std::vector<std::string> steps) const {
     LaunchOptions options{.command = {RELOCD_TEST_CHILD, "child", log_}};
     options.command.insert(options.command.end(), steps.begin(), steps.end());
@@ -47,7 +40,8 @@ class ChildProcessTest : public testing::Test {
     return text ? *text : "";
   }
 
-  std::string log_;
+  TemporaryFolder folder_;
+  std::string log_ = folder_.path() + "/log";
 };
 
 TEST_F(ChildProcessTest, GivesTheExitCode) {
@@ -143,7 +137,6 @@ TEST_F(ChildProcessTest, EndsWithTheProcessThatStartedIt) {
   ::waitpid(parent, nullptr, 0);
   const auto pid = ReadFile(log_ + ".pid");
   ASSERT_TRUE(pid);
-  std::filesystem::remove(log_ + ".pid");
   EXPECT_TRUE(EndsSoon(static_cast<pid_t>(ParseInt64(*pid).value_or(1))));
 }
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -16,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "core/file.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -27,8 +27,7 @@ using testing::HasSubstr;
 /// Real children under a real supervisor, with short times.
 class SupervisorTest : public testing::Test {
  protected:
-  SupervisorTest() : log_(testing::TempDir() + "relocd_supervisor_" + std::to_string(::getpid())) {
-    std::filesystem::remove(log_);
+  SupervisorTest() {
     auto supervisor =
         Supervisor::Create({.backoff_initial = 30ms,
                             .abort_timeout = 300ms,
@@ -40,9 +39,6 @@ class SupervisorTest : public testing::Test {
     EXPECT_TRUE(supervisor);
     supervisor_.emplace(std::move(supervisor).value());
   }
-  ~SupervisorTest() override { std::filesystem::remove(log_); }
-  SupervisorTest(const SupervisorTest&) = delete;
-  SupervisorTest& operator=(const SupervisorTest&) = delete;
 
   ProcessSpec Child(const std::string& name, const std::vector<std::string>& steps) const {
     ProcessSpec spec{.name = name, .config = {}, .settings = {}};
@@ -95,7 +91,8 @@ class SupervisorTest : public testing::Test {
     return text ? *text : "";
   }
 
-  std::string log_;
+  TemporaryFolder folder_;
+  std::string log_ = folder_.path() + "/log";
   std::string events_;
   std::optional<Supervisor> supervisor_;
 };
@@ -223,8 +220,6 @@ TEST_F(SupervisorTest, StopsTierByTierTheRecorderLast) {
   recorder.config.stop_tier = 2;
   Apply({recorder, smoother, camera});
   RunUntil([&] { return AreReady({"camera", "smoother", "recorder"}); });
-  std::filesystem::remove(log_);
-  // Its children have the old file open: they write to it no more.
   supervisor_->Stop(MonotonicClock::now());
   std::vector<std::string> ended;
   RunUntil([&] {

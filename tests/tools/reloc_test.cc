@@ -1,7 +1,6 @@
 #include <poll.h>
 #include <unistd.h>
 
-#include <filesystem>
 #include <string>
 
 #include <fmt/format.h>
@@ -10,6 +9,7 @@
 
 #include "core/file.h"
 #include "supervision/child_process.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -23,7 +23,8 @@ struct Outcome {
 
 /// Runs `reloc <arguments>`.
 Outcome Reloc(const std::string& arguments) {
-  const std::string path = testing::TempDir() + "reloc_test_" + std::to_string(::getpid());
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/output";
   const std::string command = fmt::format("exec {} {} >{} 2>&1", RELOC_PROGRAM, arguments, path);
   auto process = ChildProcess::Start({.command = {"/bin/sh", "-c", command}});
   EXPECT_TRUE(process);
@@ -31,7 +32,6 @@ Outcome Reloc(const std::string& arguments) {
   EXPECT_EQ(::poll(&ended, 1, 10'000), 1) << "did not end";
   Outcome outcome{.exit_code = process->Reap().value_or(-1)};
   outcome.output = ReadFile(path).value();
-  std::filesystem::remove(path);
   return outcome;
 }
 

@@ -2,24 +2,21 @@
 
 #include <unistd.h>
 
-#include <filesystem>
 #include <optional>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "support/temporary_folder.h"
+
 namespace relocd {
 namespace {
 
 class InstanceLockTest : public testing::Test {
  protected:
-  InstanceLockTest() { std::filesystem::create_directories(directory_); }
-  ~InstanceLockTest() override { std::filesystem::remove_all(directory_); }
-  InstanceLockTest(const InstanceLockTest&) = delete;
-  InstanceLockTest& operator=(const InstanceLockTest&) = delete;
-
-  std::string directory_ = testing::TempDir() + "relocd_lock_" + std::to_string(::getpid());
+  TemporaryFolder folder_;
+  std::string directory_ = folder_.path();
 };
 
 TEST_F(InstanceLockTest, RefusesASecondOneAndNamesTheFirst) {

@@ -3,8 +3,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <optional>
 #include <string>
@@ -17,6 +15,7 @@
 #include "core/time.h"
 #include "supervision/child_process.h"
 #include "supervision/notify_server.h"
+#include "support/temporary_folder.h"
 
 namespace relocd {
 namespace {
@@ -28,19 +27,11 @@ using testing::HasSubstr;
 /// it tells systemd comes here.
 class RelocdProcessTest : public testing::Test {
  protected:
-  RelocdProcessTest()
-      : directory_(testing::TempDir() + "relocd_process_" + std::to_string(::getpid()) + "/") {
-    std::filesystem::create_directories(directory_);
+  RelocdProcessTest() {
     auto notify = NotifyServer::Open();
     EXPECT_TRUE(notify);
     notify_.emplace(std::move(notify).value());
   }
-  ~RelocdProcessTest() override {
-    relocd_.reset();
-    std::filesystem::remove_all(directory_);
-  }
-  RelocdProcessTest(const RelocdProcessTest&) = delete;
-  RelocdProcessTest& operator=(const RelocdProcessTest&) = delete;
 
   /// A config with the test children `first` and `second`.
   [[nodiscard]] std::string ConfigText(const std::string& second_steps) const {
@@ -118,7 +109,8 @@ class RelocdProcessTest : public testing::Test {
     return text ? *text : "";
   }
 
-  std::string directory_;
+  TemporaryFolder folder_;
+  std::string directory_ = folder_.path() + "/";
   std::optional<NotifyServer> notify_;
   std::optional<ChildProcess> relocd_;
   bool is_ready_ = false;
