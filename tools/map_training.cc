@@ -18,7 +18,6 @@ namespace relocd {
 namespace {
 
 constexpr std::size_t kMinFrames = 8;
-/// A head has this many numbers to learn; more steps than for a full region would gain nothing.
 constexpr double kMinRouteM = 0.5;
 
 Error Invalid(std::string message) {
@@ -244,8 +243,7 @@ Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOpt
   map.training.p95_error_m = trained.held_out.p95_m;
   map.training.median_error_rad = trained.held_out.median_rad;
   map.training.within_1m = trained.held_out.within_1m;
-  map.training.training_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  trained.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return trained;
 }
 

@@ -30,6 +30,7 @@ struct MapTrainingOptions {
 struct TrainedMap {
   SceneMap map;
   PoseErrors held_out;
+  double seconds = 0.0;  ///< Not in the map, so that the same seed gives the same bytes.
   std::vector<FrameLocalization> localizations;
 };
 

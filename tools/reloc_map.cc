@@ -93,7 +93,7 @@ std::string FormatReport(const TrainedMap& trained, const MapTrainingOptions& op
                       options.head.iterations,
                       options.head.batch,
                       options.seed,
-                      trained.map.training.training_seconds,
+                      trained.seconds,
                       options.threads);
   return text;
 }
@@ -155,7 +155,7 @@ std::string FormatInfo(const SceneMap& map) {
       "format    {}\n"
       "camera    {} x {} px, f {:.2f} {:.2f}, centre {:.2f} {:.2f}\n"
       "features  {} octaves at {} x {} px, every {} px, {} -> {} dimensions, {} cells an image\n"
-      "training  {} frames of {}, seed {}, {:.0f} s, program {}\n"
+      "training  {} frames of {}, seed {}, program {}\n"
       "held out  {} frames: median {:.3f} m {:.3f} deg, p95 {:.3f} m, within 1 m {:.1f} %\n",
       map.id,
       kMapFormatVersion,
@@ -175,7 +175,6 @@ std::string FormatInfo(const SceneMap& map) {
       training.training_frames,
       training.dataset,
       training.seed,
-      training.training_seconds,
       training.program_version,
       training.held_out_frames,
       training.median_error_m,
@@ -229,7 +228,7 @@ std::string FormatInfoJson(const SceneMap& map) {
   }
   return fmt::format(
       R"({{"id": "{}", "format_version": {}, "image_width": {}, "image_height": {}, "dataset": {}, )"
-      R"("seed": {}, "training_frames": {}, "training_seconds": {}, "held_out_frames": {}, )"
+      R"("seed": {}, "training_frames": {}, "held_out_frames": {}, )"
       R"("median_error_m": {}, "median_error_rad": {}, "p95_error_m": {}, "within_1m": {}, )"
       R"("regions": [{}]}})"
       "\n",
@@ -240,7 +239,6 @@ std::string FormatInfoJson(const SceneMap& map) {
       Quoted(training.dataset),
       training.seed,
       training.training_frames,
-      training.training_seconds,
       training.held_out_frames,
       training.median_error_m,
       training.median_error_rad,

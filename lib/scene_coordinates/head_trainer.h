@@ -13,7 +13,7 @@ namespace relocd {
 /// How a head is trained. Errors are in working pixels.
 struct HeadTrainerConfig {
   HeadShape shape;
-  int iterations = 6000;
+  int iterations = 5000;
   int batch = 4096;             ///< A multiple of kTrainerShards.
   double learning_rate = 3e-3;  ///< The highest of the one cycle.
   double warm_up = 0.1;         ///< Share of the iterations until it is reached.

@@ -88,7 +88,6 @@ void VisitTraining(Archive& archive, Summary& training) {
       "training.training_frames", training.training_frames, 0, kMax32);
   archive.template Number<std::uint32_t>(
       "training.held_out_frames", training.held_out_frames, 0, kMax32);
-  archive.Number("training.training_seconds", training.training_seconds, 0.0, kUnbounded);
   archive.Number("training.median_error_m", training.median_error_m, 0.0, kUnbounded);
   archive.Number("training.p95_error_m", training.p95_error_m, 0.0, kUnbounded);
   archive.Number("training.median_error_rad", training.median_error_rad, 0.0, kUnbounded);
@@ -260,10 +259,10 @@ Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
   const std::string digest = Sha256Hex(content);
   const std::string_view expected(header.sha256.data(), header.sha256.size());
   if (digest != expected) {
-    return Refusal(name,
-                   fmt::format("sha256 of the content is {}, must be {}: it is damaged",
-                               digest,
-                               Printable(expected)));
+    return Refusal(
+        name,
+        fmt::format(
+            "sha256 of the content is {}, must be {}: it is damaged", digest, Printable(expected)));
   }
   SceneMap map;
   MapReader reader(content);

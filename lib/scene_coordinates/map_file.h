@@ -51,7 +51,6 @@ struct TrainingSummary {
   std::uint64_t seed = 0;
   std::uint32_t training_frames = 0;
   std::uint32_t held_out_frames = 0;
-  double training_seconds = 0.0;
   double median_error_m = 0.0;  ///< On held-out frames, as all below.
   double p95_error_m = 0.0;
   double median_error_rad = 0.0;

@@ -66,7 +66,6 @@ inline SceneMap MakeTestMap() {
                   .seed = 7,
                   .training_frames = 100,
                   .held_out_frames = 10,
-                  .training_seconds = 12.5,
                   .median_error_m = 0.25,
                   .p95_error_m = 0.75,
                   .median_error_rad = 0.01,

@@ -1,0 +1,135 @@
+#include <poll.h>
+
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "camera/jpeg.h"
+#include "core/csv.h"
+#include "core/exit_code.h"
+#include "core/file.h"
+#include "scene_coordinates/wall_scene.h"
+#include "supervision/child_process.h"
+#include "support/temporary_folder.h"
+
+namespace relocd {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+struct Outcome {
+  int exit_code = -1;
+  std::string output{};  ///< Of both stdout and stderr.
+};
+
+/// A drive along the wall as a data set, and the program run in it.
+class RelocMapTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    constexpr int kFrames = 9;
+    std::string frames;
+    std::string poses;
+    const auto drive = WallScene().Drive(kFrames);
+    for (int index = 0; index < kFrames; ++index) {
+      const TrainingImage& view = drive[static_cast<std::size_t>(index)];
+      const auto jpeg = EncodeGrayToJpeg(view.image, 95).value();
+      const std::string name = fmt::format("images/{:02}.jpg", index);
+      folder_.Write(name, {reinterpret_cast<const char*>(jpeg.data()), jpeg.size()});
+      frames += name + "\n";
+      const Eigen::Vector3d& t = view.X_WC.translation();
+      poses += fmt::format("{:.1f} {} {} {} 0 0 0 1\n", 0.1 * index, t.x(), t.y(), t.z());
+    }
+    folder_.Write("frames.txt", frames);
+    folder_.Write("poses_tum.txt", poses);
+    folder_.Write("intrinsics.txt", "220 220 119.5 79.5 240 160\n");
+  }
+
+  [[nodiscard]] std::string Path(std::string_view name) const {
+    return fmt::format("{}/{}", folder_.path(), name);
+  }
+
+  [[nodiscard]] Outcome Run(const std::string& arguments) const {
+    const std::string command = fmt::format(
+        "cd {} && exec {} {} >output.txt 2>&1", folder_.path(), RELOC_MAP_PROGRAM, arguments);
+    auto process = ChildProcess::Start({.command = {"/bin/sh", "-c", command}});
+    EXPECT_TRUE(process);
+    pollfd ended{.fd = process->fd(), .events = POLLIN, .revents = 0};
+    EXPECT_EQ(::poll(&ended, 1, 200'000), 1) << "did not end";
+    return {.exit_code = process->Reap().value_or(-1),
+            .output = ReadFile(Path("output.txt")).value()};
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(RelocMapTest, TrainsAMapThatLocalizeAndInfoRead) {
+  const std::string train = "train --dataset . --iterations 3 --views 1 --threads 1 --out ";
+  const Outcome trained = Run(train + "a.relocmap --report report");
+  ASSERT_EQ(trained.exit_code, kExitOk) << trained.output;
+  EXPECT_THAT(ReadFile(Path("report/report.txt")).value(), HasSubstr("held-out training frames: "));
+
+  const Outcome localized =
+      Run("localize --map a.relocmap --dataset . --frames 3:8 --out poses.csv");
+  ASSERT_EQ(localized.exit_code, kExitOk) << localized.output;
+  EXPECT_THAT(localized.output, HasSubstr("of 5 frames: median "));
+  const auto poses = CsvTable::Read(Path("poses.csv"));
+  ASSERT_TRUE(poses) << poses.error().message;
+  ASSERT_EQ(poses->row_count(), 5U);
+  EXPECT_EQ(poses->Int64(0, 0).value(), 3);
+
+  const Outcome info = Run("info a.relocmap --json");
+  EXPECT_EQ(info.exit_code, kExitOk);
+  EXPECT_THAT(info.output,
+              AllOf(HasSubstr(R"("format_version": 1)"), HasSubstr(R"("image_width": 240)")));
+
+  ASSERT_EQ(Run(train + "b.relocmap").exit_code, kExitOk);
+  EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("b.relocmap")).value());
+}
+
+TEST_F(RelocMapTest, RefusesAMapThatIsMissingOrNone) {
+  EXPECT_EQ(Run("info nothing.relocmap").exit_code, kExitConfig);
+  folder_.Write("text.relocmap", "this is no map at all");
+  const Outcome outcome = Run("localize --map text.relocmap --dataset . --out poses.csv");
+  EXPECT_EQ(outcome.exit_code, kExitConfig);
+  EXPECT_THAT(
+      outcome.output,
+      HasSubstr("reloc map: text.relocmap: begins with 'this is ', must begin with 'RELOCMAP'"));
+}
+
+TEST_F(RelocMapTest, RefusesImagesOfAnotherSize) {
+  folder_.Write("intrinsics.txt", "220 220 119.5 79.5 320 160\n");
+  const Outcome outcome = Run("train --dataset . --out a.relocmap");
+  EXPECT_EQ(outcome.exit_code, kExitConfig);
+  EXPECT_THAT(outcome.output, HasSubstr("image is 240 x 160 pixels, must be 320 x 160"));
+}
+
+TEST_F(RelocMapTest, RefusesADriveThatIsTooShort) {
+  const Outcome few = Run("train --dataset . --frames 0:5 --out a.relocmap");
+  EXPECT_EQ(few.exit_code, kExitConfig);
+  EXPECT_THAT(few.output, HasSubstr("5 training frames, must be at least 8"));
+}
+
+TEST_F(RelocMapTest, RefusesAWorldThatLiesOnItsSide) {
+  std::string poses;
+  for (int index = 0; index < 9; ++index) {  // a quarter turn about the optical axis: x is up
+    poses += fmt::format("{:.1f} {} 0 0 0 0 0.70710678 0.70710678\n", 0.1 * index, 0.4 * index);
+  }
+  folder_.Write("poses_tum.txt", poses);
+  const Outcome outcome = Run("train --dataset . --out a.relocmap");
+  EXPECT_EQ(outcome.exit_code, kExitConfig);
+  EXPECT_THAT(outcome.output,
+              HasSubstr("up axis is +x of the data set's world, must be +z, +y or -y"));
+}
+
+TEST_F(RelocMapTest, RefusesAWrongCommandLine) {
+  EXPECT_EQ(Run("train --dataset .").exit_code, kExitUsage);
+  EXPECT_EQ(Run("").exit_code, kExitUsage);
+  EXPECT_EQ(Run("--help").exit_code, kExitOk);
+}
+
+}  // namespace
+}  // namespace relocd
