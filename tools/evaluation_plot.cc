@@ -115,6 +115,7 @@ class Canvas {
   }
   void Polygon(const std::vector<cv::Point2d>& corners, const cv::Scalar& colour) {
     std::vector<cv::Point> fixed;
+    fixed.reserve(corners.size());
     for (const cv::Point2d& corner : corners)
       fixed.push_back(Fixed(corner));
     cv::fillPoly(image_, std::vector{fixed}, colour, cv::LINE_AA, kShift);
@@ -191,6 +192,16 @@ std::string TickLabel(double value, double step) {
   return fmt::format("{:.{}f}", rounded == 0.0 ? 0.0 : rounded, decimals);
 }
 
+/// The multiples of `step` within a range, at most a hundred.
+std::vector<double> Multiples(double step, const Range& range) {
+  constexpr int kMost = 100;
+  const double first = std::ceil(range.low / step);
+  std::vector<double> multiples;
+  for (int i = 0; i < kMost && (first + i) * step <= range.high; ++i)
+    multiples.push_back((first + i) * step);
+  return multiples;
+}
+
 void DrawAxes(Canvas& canvas,
               const Panel& panel,
               const std::string& x_label,
@@ -200,13 +211,13 @@ void DrawAxes(Canvas& canvas,
   constexpr double kGap = 8.0;
   const cv::Rect2d& box = panel.box;
   const double x_step = NiceStep(panel.x.size(), box.width / kTickDistance);
-  for (double x = std::ceil(panel.x.low / x_step) * x_step; x <= panel.x.high; x += x_step) {
+  for (const double x : Multiples(x_step, panel.x)) {
     const double u = panel.Pixel({x, panel.y.low}).x;
     canvas.Line({u, box.y}, {u, box.br().y}, kGrid, 1.0);
     canvas.Text(TickLabel(x, x_step), {u, box.br().y + kGap}, {0.5, 0.0});
   }
   const double y_step = NiceStep(panel.y.size(), std::max(3.0, box.height / kRowDistance));
-  for (double y = std::ceil(panel.y.low / y_step) * y_step; y <= panel.y.high; y += y_step) {
+  for (const double y : Multiples(y_step, panel.y)) {
     const double v = panel.Pixel({panel.x.low, y}).y;
     canvas.Line({box.x, v}, {box.br().x, v}, kGrid, 1.0);
     canvas.Text(TickLabel(y, y_step), {box.x - kGap, v}, {1.0, 0.5});
@@ -373,6 +384,7 @@ std::size_t DrawEstimates(Canvas& canvas,
 
 void DrawTruth(Canvas& canvas, const Panel& panel, const std::vector<Eigen::Vector2d>& truth) {
   std::vector<cv::Point2d> pixels;
+  pixels.reserve(truth.size());
   for (const Eigen::Vector2d& point : truth)
     pixels.push_back(panel.Pixel(point));
   canvas.Polyline(pixels, kTruthColour, 2.5);
