@@ -24,7 +24,10 @@ class AbsolutePoseResidual {
 
   /// @param covariance  3x3 of X_WM's right perturbation (x, y, yaw), positive definite.
   AbsolutePoseResidual(const Pose2& X_WM, const Pose2& X_KF, const Eigen::Matrix3d& covariance)
-      : X_WM_(X_WM), X_KF_(X_KF), sqrt_information_(covariance.inverse().llt().matrixU()) {}
+      : X_WM_(X_WM), X_KF_(X_KF), weight_(covariance.inverse().llt().matrixU()) {
+    const Eigen::Matrix2d R_MW = Eigen::Rotation2Dd(-X_WM.yaw()).toRotationMatrix();
+    weight_.leftCols<2>() = (weight_.leftCols<2>() * R_MW).eval();
+  }
 
   template <typename T>
   bool operator()(const T* x_WK, T* residual) const {
@@ -32,20 +35,19 @@ class AbsolutePoseResidual {
     const Vector2 p_WK(x_WK[0], x_WK[1]);
     const Vector2 p_WF =
         p_WK + Eigen::Rotation2D<T>(x_WK[2]) * X_KF_.translation().cast<T>().eval();
-    const Eigen::Matrix2d R_MW = Eigen::Rotation2Dd(-X_WM_.yaw()).toRotationMatrix();
 
     Eigen::Matrix<T, 3, 1> error;
-    error << R_MW.cast<T>() * (p_WF - X_WM_.translation().cast<T>()),
-        WrapAngle(x_WK[2] + X_KF_.yaw() - X_WM_.yaw());
+    error << p_WF - X_WM_.translation().cast<T>(), WrapAngle(x_WK[2] + X_KF_.yaw() - X_WM_.yaw());
     Eigen::Map<Eigen::Matrix<T, 3, 1>> weighted(residual);
-    weighted = sqrt_information_.cast<T>() * error;
+    weighted = weight_.cast<T>() * error;
     return true;
   }
 
  private:
   Pose2 X_WM_;
   Pose2 X_KF_;
-  Eigen::Matrix3d sqrt_information_;  ///< Upper triangular: matrixL() would weight wrongly.
+  /// S, which is upper triangular (matrixL() would weight wrongly), after the rotation to M's axes.
+  Eigen::Matrix3d weight_;
 };
 
 /// The same for a measured position without heading: S * (p_WF - p_WM), along W's axes.

@@ -176,18 +176,18 @@ class OdometryLookup {
 
 OdometryStep MakeOdometryStep(MonotonicTime time,
                               Duration duration,
-                              const Pose2& X_BprevB,
+                              const Pose2& motion,
                               const OdometryNoiseConfig& noise) {
   const auto variance = [](double sigma_per_root, double amount) {
     return sigma_per_root * sigma_per_root * amount;
   };
-  const double travel = X_BprevB.translation().norm();
-  const double turn = std::abs(X_BprevB.yaw());
+  const double travel = motion.translation().norm();
+  const double turn = std::abs(motion.yaw());
   const double seconds = ToSeconds(duration);
   const double at_rest = variance(noise.position_sigma_m_per_sqrt_s, seconds);
   OdometryStep step;
   step.time = time;
-  step.X_BprevB = X_BprevB;
+  step.X_BprevB = motion;
   step.covariance.diagonal() << at_rest + variance(noise.forward_sigma_m_per_sqrt_m, travel),
       at_rest + variance(noise.sideways_sigma_m_per_sqrt_m, travel),
       variance(noise.heading_sigma_rad_per_sqrt_s, seconds) +

@@ -21,7 +21,7 @@ struct MotionLog {
 /// A step of odometry without covariances: they come from its travel, turn and duration.
 OdometryStep MakeOdometryStep(MonotonicTime time,
                               Duration duration,
-                              const Pose2& X_BprevB,
+                              const Pose2& motion,
                               const OdometryNoiseConfig& noise);
 
 /// Fixes without covariances: they come from the config.

@@ -23,7 +23,10 @@ class RelativePoseResidual {
   /// @param X_AB        the measured pose of B in A.
   /// @param covariance  3x3 of X_AB's right perturbation (x, y, yaw), positive definite.
   RelativePoseResidual(const Pose2& X_AB, const Eigen::Matrix3d& covariance)
-      : X_AB_(X_AB), sqrt_information_(covariance.inverse().llt().matrixU()) {}
+      : X_AB_(X_AB), weight_(covariance.inverse().llt().matrixU()) {
+    const Eigen::Matrix2d R_BA = Eigen::Rotation2Dd(-X_AB.yaw()).toRotationMatrix();
+    weight_.leftCols<2>() = (weight_.leftCols<2>() * R_BA).eval();
+  }
 
   template <typename T>
   bool operator()(const T* x_WA, const T* x_WB, T* residual) const {
@@ -31,19 +34,18 @@ class RelativePoseResidual {
     const Vector2 p_WA(x_WA[0], x_WA[1]);
     const Vector2 p_WB(x_WB[0], x_WB[1]);
     const Vector2 p_AB = Eigen::Rotation2D<T>(-x_WA[2]) * Vector2(p_WB - p_WA);
-    const Eigen::Matrix2d R_BA = Eigen::Rotation2Dd(-X_AB_.yaw()).toRotationMatrix();
 
     Eigen::Matrix<T, 3, 1> error;
-    error << R_BA.cast<T>() * (p_AB - X_AB_.translation().cast<T>()),
-        WrapAngle(x_WB[2] - x_WA[2] - X_AB_.yaw());
+    error << p_AB - X_AB_.translation().cast<T>(), WrapAngle(x_WB[2] - x_WA[2] - X_AB_.yaw());
     Eigen::Map<Eigen::Matrix<T, 3, 1>> weighted(residual);
-    weighted = sqrt_information_.cast<T>() * error;
+    weighted = weight_.cast<T>() * error;
     return true;
   }
 
  private:
   Pose2 X_AB_;
-  Eigen::Matrix3d sqrt_information_;  ///< Upper triangular: matrixL() would weight wrongly.
+  /// S, which is upper triangular (matrixL() would weight wrongly), after the rotation to B's axes.
+  Eigen::Matrix3d weight_;
 };
 
 }  // namespace relocd

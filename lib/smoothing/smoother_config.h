@@ -46,7 +46,7 @@ struct SmootherConfig {
   double keyframe_distance_m = 0.5;
   double keyframe_angle_rad = 0.15;
   double keyframe_interval_s = 2.0;
-  int max_iterations = 3;
+  int max_iterations = 2;
 
   double cauchy_scale_sigmas = 1.0;
   double gate_squared_mahalanobis = 100.0;

@@ -122,19 +122,34 @@ TEST(KeyframeWindowTest, MarginalizingChangesNeitherEstimateNorCovariance) {
               IsNear(NewestCovariance(whole, kQuadratic), 1e-4));
 }
 
+/// A stiff chain that is held by weak fixes alone: what a rigid shift costs is small beside what
+/// bending costs.
+KeyframeWindow MakeStiffWindow() {
+  KeyframeWindow window = MakeWindow(200, 3);
+  window.prior.reset();
+  for (Keyframe& keyframe : window.keyframes) {
+    keyframe.covariance_PK = 1e-5 * Eigen::Matrix3d::Identity();
+    if (keyframe.motion_residual) keyframe.motion_residual = MakeMotionResidual(keyframe);
+  }
+  for (AttachedFix& fix : window.fixes) {
+    fix.fix.covariance = 49.0 * Eigen::Matrix3d::Identity();
+    fix.residual = MakeFixResidual(fix);
+  }
+  return window;
+}
+
 TEST(KeyframeWindowTest, FindsTheMinimumInAFewIterationsFarFromIt) {
-  // Ceres's default trust radius damps the rigid shift: it would stop metres short.
-  KeyframeWindow window = MakeWindow(100, 3);
-  KeyframeWindow shifted = MakeWindow(100, 3);
+  KeyframeWindow window = MakeStiffWindow();
+  KeyframeWindow shifted = MakeStiffWindow();
   for (Keyframe& keyframe : shifted.keyframes) {
     keyframe.x_WK[0] += 30.0;
     keyframe.x_WK[1] -= 20.0;
   }
-  ASSERT_TRUE(Solve(window, kQuadratic, 50));
+  ASSERT_TRUE(Solve(window, kQuadratic, 100));
   ASSERT_TRUE(Solve(shifted, kQuadratic, 3));
   const Pose2 difference =
       window.keyframes.back().X_WK().Inverse() * shifted.keyframes.back().X_WK();
-  EXPECT_LT(difference.translation().norm(), 0.01);
+  EXPECT_LT(difference.translation().norm(), 0.05);
 }
 
 TEST(KeyframeWindowTest, FixesOfOnePlaceCountAsOneAtMost) {

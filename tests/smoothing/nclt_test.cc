@@ -59,6 +59,7 @@ ErrorStatistics ErrorsOf(const std::vector<Eigen::Vector2d>& positions,
                          const std::vector<Eigen::Vector2d>& truth,
                          std::size_t first) {
   std::vector<double> errors;
+  errors.reserve(truth.size());
   for (std::size_t i = first; i < truth.size(); ++i) {
     errors.push_back((positions[i] - truth[i]).norm());
   }
@@ -67,6 +68,7 @@ ErrorStatistics ErrorsOf(const std::vector<Eigen::Vector2d>& positions,
 
 std::vector<Eigen::Vector2d> PositionsOf(const std::vector<SmootherEstimate>& estimates) {
   std::vector<Eigen::Vector2d> positions;
+  positions.reserve(estimates.size());
   for (const SmootherEstimate& estimate : estimates) {
     positions.push_back(estimate.X_WB.translation());
   }
