@@ -77,30 +77,34 @@ void V4l2FrameSource::Recover(const std::string& why, MonotonicTime now) {
 
 std::optional<Frame> V4l2FrameSource::Next(MonotonicTime now) {
   if (!device_ && now >= wake_up_) TryOpen(now);
-  for (int i = 0; device_ && i < kMostBuffers; ++i) {
-    auto buffer = device_->Dequeue();
-    if (!buffer) {
-      const Error& error = buffer.error();
-      if (error.kind == ErrorKind::kUnavailable) {
-        Lose(error.message, now);
-      } else {
-        Recover(error.message, now);
-      }
-      return std::nullopt;
-    }
-    if (!buffer->has_value()) {
-      if (now >= wake_up_) {
-        Recover(
-            fmt::format("{}: gave no frame for {} ms", config_.device, config_.no_frame_timeout_ms),
-            now);
-      }
-      return std::nullopt;
-    }
-    auto frame = Fetch(**buffer, now);
-    if (auto ok = device_->Requeue(**buffer); !ok) Recover(ok.error().message, now);
+  for (int i = 0; i < kMostBuffers; ++i) {
+    const auto buffer = Dequeue(now);
+    if (!buffer) return std::nullopt;
+    auto frame = Fetch(*buffer, now);
+    if (auto ok = device_->Requeue(*buffer); !ok) Recover(ok.error().message, now);
     if (frame) return frame;
   }
   return std::nullopt;
+}
+
+/// The oldest filled buffer; nothing when none is, which is seen to if it lasts.
+std::optional<V4l2Buffer> V4l2FrameSource::Dequeue(MonotonicTime now) {
+  if (!device_) return std::nullopt;
+  auto buffer = device_->Dequeue();
+  if (!buffer) {
+    const Error error = std::move(buffer).error();
+    if (error.kind == ErrorKind::kUnavailable) {
+      Lose(error.message, now);
+    } else {
+      Recover(error.message, now);
+    }
+    return std::nullopt;
+  }
+  if (!buffer->has_value() && now >= wake_up_) {
+    Recover(fmt::format("{}: gave no frame for {} ms", config_.device, config_.no_frame_timeout_ms),
+            now);
+  }
+  return *buffer;
 }
 
 /// The frame, copied out of the buffer: it is the driver's again after this.

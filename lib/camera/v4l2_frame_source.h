@@ -34,6 +34,7 @@ class V4l2FrameSource final : public FrameSource {
   /// Restarts the stream; if that was the last thing tried, closes the device.
   void Recover(const std::string& why, MonotonicTime now);
 
+  std::optional<V4l2Buffer> Dequeue(MonotonicTime now);
   std::optional<Frame> Fetch(const V4l2Buffer& buffer, MonotonicTime now);
   [[nodiscard]] Result<std::vector<std::uint8_t>> MakeJpeg(const V4l2Buffer& buffer);
   void CountGap(const V4l2Buffer& buffer);
