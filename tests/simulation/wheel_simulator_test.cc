@@ -121,9 +121,9 @@ TEST_P(WheelSimulatorTest, TheSeedDecides) {
 }
 
 /// The squared Mahalanobis distance of the pose at the end follows a chi-squared distribution of
-/// three degrees of freedom: over 100 seeds its mean is 3 +- 0.25.
+/// three degrees of freedom: over 60 seeds its mean is 3 +- 0.32.
 TEST_P(WheelSimulatorTest, OdometrysErrorIsAsLargeAsItSays) {
-  constexpr int kSeeds = 100;
+  constexpr int kSeeds = 60;
   double sum = 0.0;
   int inside = 0;
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
@@ -135,9 +135,9 @@ TEST_P(WheelSimulatorTest, OdometrysErrorIsAsLargeAsItSays) {
     sum += squared;
     inside += squared < kChiSquared95Dof3 ? 1 : 0;
   }
-  EXPECT_GT(sum / kSeeds, 2.2);
-  EXPECT_LT(sum / kSeeds, 3.8);
-  EXPECT_GE(inside, 89);
+  EXPECT_GT(sum / kSeeds, 2.0);
+  EXPECT_LT(sum / kSeeds, 4.0);
+  EXPECT_GE(inside, 52);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, WheelSimulatorTest, testing::Bool(), [](const auto& instance) {
