@@ -336,22 +336,23 @@ Result<void> DbcParser::SetRawType(std::string_view rest) {
   parser.Take(':');
   const auto type = parser.Integer("type of the raw value", 2);
   if (auto ok = parser.status(); !ok) return ok;
-  for (DbcMessage& message : messages_) {
-    const std::uint32_t flag = message.id.extended ? kCanExtendedFlag : 0;
-    if ((message.id.value | flag) != id) continue;
-    for (DbcSignal& signal : message.signals) {
-      if (signal.name != name || type == 0) continue;
-      const int length = type == 1 ? 32 : 64;
-      if (signal.length != length) {
-        return Malformed(fmt::format("floating-point signal {}.{} has {} bits, must have {}",
-                                     message.name,
-                                     name,
-                                     signal.length,
-                                     length));
-      }
-      signal.type = type == 1 ? RawType::kFloat : RawType::kDouble;
-    }
+  const CanId can_id{.value = id & ~kCanExtendedFlag, .extended = (id & kCanExtendedFlag) != 0};
+  const auto message = std::find_if(
+      messages_.begin(), messages_.end(), [&](const DbcMessage& m) { return m.id == can_id; });
+  if (message == messages_.end() || type == 0) return {};
+  const auto signal = std::find_if(message->signals.begin(),
+                                   message->signals.end(),
+                                   [&](const DbcSignal& s) { return s.name == name; });
+  if (signal == message->signals.end()) return {};
+  const int length = type == 1 ? 32 : 64;
+  if (signal->length != length) {
+    return Malformed(fmt::format("floating-point signal {}.{} has {} bits, must have {}",
+                                 message->name,
+                                 name,
+                                 signal->length,
+                                 length));
   }
+  signal->type = type == 1 ? RawType::kFloat : RawType::kDouble;
   return {};
 }
 
@@ -402,23 +403,34 @@ Result<DbcFile> DbcFile::Parse(std::string_view text, const std::string& path) {
 }
 
 Result<DbcFile::SignalReference> DbcFile::FindSignal(std::string_view full_name) const {
+  const auto dot = full_name.find('.');
+  const auto message = std::find_if(messages_.begin(), messages_.end(), [&](const DbcMessage& m) {
+    return m.name == full_name.substr(0, dot);
+  });
+  const DbcSignal* signal = message == messages_.end() || dot == std::string_view::npos
+                                ? nullptr
+                                : message->FindSignal(full_name.substr(dot + 1));
+  if (signal == nullptr) {
+    return Malformed(fmt::format("{}: has no signal '{}', nearest are {}",
+                                 path_,
+                                 full_name,
+                                 fmt::join(NearestNames(full_name, SignalNames(), 3), ", ")));
+  }
+  const DbcSignal* multiplexor = message->multiplexor();
+  if (signal->mux_value && multiplexor != nullptr && multiplexor->mux_value) {
+    return Malformed(fmt::format(
+        "{}: signal '{}' is multiplexed twice, must be at most once", path_, full_name));
+  }
+  return SignalReference{.message = &*message, .signal = signal};
+}
+
+std::vector<std::string> DbcFile::SignalNames() const {
   std::vector<std::string> names;
   for (const DbcMessage& message : messages_) {
-    for (const DbcSignal& signal : message.signals) {
+    for (const DbcSignal& signal : message.signals)
       names.push_back(fmt::format("{}.{}", message.name, signal.name));
-      if (names.back() != full_name) continue;
-      if (signal.mux_value && message.multiplexor() != nullptr &&
-          message.multiplexor()->mux_value) {
-        return Malformed(fmt::format(
-            "{}: signal '{}' is multiplexed twice, must be at most once", path_, full_name));
-      }
-      return SignalReference{.message = &message, .signal = &signal};
-    }
   }
-  return Malformed(fmt::format("{}: has no signal '{}', nearest are {}",
-                               path_,
-                               full_name,
-                               fmt::join(NearestNames(full_name, names, 3), ", ")));
+  return names;
 }
 
 }  // namespace relocd

@@ -71,6 +71,9 @@ class DbcFile {
   [[nodiscard]] Result<SignalReference> FindSignal(std::string_view full_name) const;
 
  private:
+  /// Full names, `MESSAGE.SIGNAL`.
+  [[nodiscard]] std::vector<std::string> SignalNames() const;
+
   std::string path_;
   std::vector<DbcMessage> messages_;
 };

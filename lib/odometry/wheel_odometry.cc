@@ -107,15 +107,15 @@ std::optional<OdometryIncrement> WheelOdometry::Handle(const CanFrame& frame) {
 }
 
 OdometryIncrement WheelOdometry::Begin(const WheelSample& sample) {
-  anchor_.emplace();
-  anchor_->sample = sample;
+  Anchor anchor{.sample = sample};
   if (signals_.are_ticks()) {
     for (std::size_t i = 0; i < 2; ++i)
-      anchor_->ticks.at(i) = static_cast<std::int64_t>(sample.ticks.at(i));
+      anchor.ticks.at(i) = static_cast<std::int64_t>(sample.ticks.at(i));
   } else {
-    anchor_->speeds_mps = ScaledSpeeds(sample);
-    anchor_->has_speeds = true;
+    anchor.speeds_mps = ScaledSpeeds(sample);
+    anchor.has_speeds = true;
   }
+  anchor_ = anchor;
   time_ = sample.time;
   // No time has passed; a covariance of zero would have no inverse.
   const BodyMotion none = MotionFromTravel(config_.drive, {.duration_s = config_.max_interval_s});

@@ -137,7 +137,7 @@ class WheelOdometry {
     Eigen::Vector2d speeds_mps = Eigen::Vector2d::Zero();  ///< Of the wheels, scaled.
     bool has_speeds = false;                               ///< One reading of ticks has none.
     std::array<std::int64_t, 2> ticks{};                   ///< Unwrapped.
-    Pose2 X_OB;
+    Pose2 X_OB{};
   };
 
   WheelOdometry(const OdometryConfig& config, WheelSignals signals)

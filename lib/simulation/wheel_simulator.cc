@@ -271,9 +271,9 @@ Result<SimulatedDrive> SimulateWheels(const Trajectory2& X_WBs,
     }
     drive.X_WBs.push_back({.time_ns = time_ns, .X_WB = X_WB});
     for (int step = 1; step <= kSubsteps; ++step) {
-      const Pose2 X_WBnext = trajectory.At(time_ns + period_ns * step / kSubsteps);
-      wheels.Roll(X_WB.Inverse() * X_WBnext);
-      X_WB = X_WBnext;
+      const Pose2 X_WBj = trajectory.At(time_ns + period_ns * step / kSubsteps);
+      wheels.Roll(X_WB.Inverse() * X_WBj);
+      X_WB = X_WBj;
     }
     wheels.MeasureSpeeds(period_s);
   }
