@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -66,6 +67,22 @@ std::vector<RegionFrames> DivideRoute(const std::vector<DatasetFrame>& frames,
   return regions;
 }
 
+Result<void> CheckFrames(const Dataset& dataset) {
+  if (dataset.frames.size() < kMinFrames) {
+    return Invalid(fmt::format("{}: {} training frames, must be at least {}",
+                               dataset.directory,
+                               dataset.frames.size(),
+                               kMinFrames));
+  }
+  if (const double route = TravelledMetres(dataset.frames).back(); route < kMinRouteM) {
+    return Invalid(fmt::format("{}: the camera travels {:.3f} m, must be at least {} m",
+                               dataset.directory,
+                               route,
+                               kMinRouteM));
+  }
+  return {};
+}
+
 Result<std::vector<TrainingImage>> LoadImages(const std::vector<DatasetFrame>& frames,
                                               const CameraIntrinsics& camera,
                                               const Pose3& X_WD) {
@@ -111,15 +128,18 @@ Result<MapRegion> TrainRegion(const std::vector<TrainingImage>& images,
   TrainingSetConfig cells = options.cells;
   cells.seed = options.seed;
   cells.threads = options.threads;
+  if (!map.regions.empty()) cells.whitening = &map.whitening;
   Result<PreparedTraining> prepared = [&] {
     ProgressLine line(name + ": features and depths");
     return PrepareTraining(
         images, camera, map.features, cells, [&](double done) { line.Show(done, ""); });
   }();
   if (!prepared) return std::move(prepared).error();
-  map.whitening = std::move(prepared->whitening);
-  RoundAsStored(map.whitening.mean);
-  RoundAsStored(map.whitening.basis);
+  if (map.regions.empty()) {
+    map.whitening = std::move(prepared->whitening);
+    RoundAsStored(map.whitening.mean);
+    RoundAsStored(map.whitening.basis);
+  }
 
   HeadTrainerConfig config = options.head;
   config.seed = options.seed;
@@ -152,7 +172,9 @@ RegionCalibration Calibrate(const SceneMap& map, const std::vector<FrameLocaliza
   // they seem to: the factor is taken where nine of ten frames are inside their 90 % region.
   constexpr double kShare = 0.9;
   constexpr double kChiSquared90Dof6 = 10.644640675668422;
-  constexpr double kThresholdShare = 0.3;
+  // Images of other places have a confidence of about 0.01; in poor light it falls to a tenth.
+  constexpr double kThresholdShare = 0.1;
+  constexpr double kLeastThreshold = 0.03;
   constexpr double kRightM = 2.0;
   RegionCalibration calibration;
   std::vector<double> ratios;
@@ -165,8 +187,25 @@ RegionCalibration Calibrate(const SceneMap& map, const std::vector<FrameLocaliza
   }
   if (ratios.empty() || confidences.empty()) return calibration;
   calibration.covariance_factor = std::clamp(Quantile(ratios, kShare), 1.0, 1e6);
-  calibration.confidence_threshold = kThresholdShare * Quantile(confidences, 0.05);
+  calibration.confidence_threshold =
+      std::max(kLeastThreshold, kThresholdShare * Quantile(confidences, 0.05));
   return calibration;
+}
+
+Result<void> CalibrateRegions(const std::vector<DatasetFrame>& held_out,
+                              int threads,
+                              SceneMap& map) {
+  const auto raw = LocalizeFrames(map, held_out, {}, threads);
+  if (!raw) return raw.error();
+  for (std::size_t index = 0; index < map.regions.size(); ++index) {
+    std::vector<FrameLocalization> of_region;
+    std::copy_if(raw->begin(),
+                 raw->end(),
+                 std::back_inserter(of_region),
+                 [&](const FrameLocalization& result) { return result.region == index; });
+    map.regions[index].calibration = Calibrate(map, of_region);
+  }
+  return {};
 }
 
 }  // namespace
@@ -187,18 +226,7 @@ Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOpt
   if (auto valid = options.Validate(); !valid) return std::move(valid).error();
   const auto start = std::chrono::steady_clock::now();
   const Dataset& dataset = selected.dataset;
-  if (dataset.frames.size() < kMinFrames) {
-    return Invalid(fmt::format("{}: {} training frames, must be at least {}",
-                               dataset.directory,
-                               dataset.frames.size(),
-                               kMinFrames));
-  }
-  if (const double route = TravelledMetres(dataset.frames).back(); route < kMinRouteM) {
-    return Invalid(fmt::format("{}: the camera travels {:.3f} m, must be at least {} m",
-                               dataset.directory,
-                               route,
-                               kMinRouteM));
-  }
+  if (auto enough = CheckFrames(dataset); !enough) return std::move(enough).error();
   const auto R_WD = RotationToMap(dataset);
   if (!R_WD) return R_WD.error();
 
@@ -221,14 +249,8 @@ Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOpt
     held_out.insert(held_out.end(), frames.held_out.begin(), frames.held_out.end());
   }
 
-  auto raw = LocalizeFrames(map, held_out, {}, options.threads);
-  if (!raw) return std::move(raw).error();
-  for (std::size_t index = 0; index < map.regions.size(); ++index) {
-    std::vector<FrameLocalization> of_region;
-    std::copy_if(raw->begin(), raw->end(), std::back_inserter(of_region), [&](const auto& result) {
-      return result.region == index;
-    });
-    map.regions[index].calibration = Calibrate(map, of_region);
+  if (auto calibrated = CalibrateRegions(held_out, options.threads, map); !calibrated) {
+    return std::move(calibrated).error();
   }
   auto localizations = LocalizeFrames(map, held_out, {}, options.threads);
   if (!localizations) return std::move(localizations).error();

@@ -177,6 +177,17 @@ void UnflattenHead(const ParameterLayout& layout, std::span<const float> paramet
   }
 }
 
+/// Where one layer's numbers are.
+template <typename Number>
+struct ShardNetwork<Number>::LayerMemory {
+  int layer = 0;
+  std::size_t rows = 0;
+  const Number* in = nullptr;
+  const Number* weights = nullptr;
+  const float* bias = nullptr;
+  const Number* out = nullptr;
+};
+
 /// oneDNN's matrix products, one per layer and purpose.
 template <typename Number>
 struct ShardNetwork<Number>::Products {
@@ -203,7 +214,69 @@ struct ShardNetwork<Number>::Products {
     return {{rows, static_cast<memory::dim>(columns)}, DataType<Number>(), memory::format_tag::ba};
   }
   void Run(const Product& product) { product.matmul.execute(stream, product.arguments); }
+
+  void AddForward(const HeadShape& shape, const LayerMemory& at);
+  void AddWeightGradient(const HeadShape& shape, const LayerMemory& at);
+  void AddBackward(const HeadShape& shape, const LayerMemory& at);
 };
+
+template <typename Number>
+void ShardNetwork<Number>::Products::AddForward(const HeadShape& shape, const LayerMemory& at) {
+  dnnl::post_ops relu;
+  if (shape.EndsBlock(at.layer)) relu.append_sum(1.0F);
+  relu.append_eltwise(1.0F, dnnl::algorithm::eltwise_relu, 0.0F, 0.0F);
+  dnnl::primitive_attr attributes;
+  attributes.set_post_ops(relu);
+  const int inputs = shape.LayerInputs(at.layer);
+  const auto in_desc = Rows(at.rows, inputs);
+  const auto out_desc = Rows(at.rows, shape.width);
+  const auto weights_desc = Rows(static_cast<std::size_t>(inputs), shape.width);
+  const auto bias_desc = Rows(1, shape.width, memory::data_type::f32);
+  const dnnl::matmul::primitive_desc description(
+      {in_desc, weights_desc, bias_desc, out_desc}, attributes, engine);
+  forward.push_back({dnnl::matmul(description),
+                     {{DNNL_ARG_SRC, Wrap(in_desc, at.in)},
+                      {DNNL_ARG_WEIGHTS, Wrap(weights_desc, at.weights)},
+                      {DNNL_ARG_BIAS, Wrap(bias_desc, at.bias)},
+                      {DNNL_ARG_DST, Wrap(out_desc, at.out)}}});
+}
+
+template <typename Number>
+void ShardNetwork<Number>::Products::AddWeightGradient(const HeadShape& shape,
+                                                       const LayerMemory& at) {
+  const int inputs = shape.LayerInputs(at.layer);
+  const auto in_transposed = Transposed(inputs, at.rows);
+  const auto delta_desc = Rows(at.rows, shape.width);
+  const auto gradient_desc =
+      Rows(static_cast<std::size_t>(inputs), shape.width, memory::data_type::f32);
+  const dnnl::matmul::primitive_desc description({in_transposed, delta_desc, gradient_desc},
+                                                 engine);
+  weight_gradients.push_back({dnnl::matmul(description),
+                              {{DNNL_ARG_SRC, Wrap(in_transposed, at.in)},
+                               {DNNL_ARG_WEIGHTS, Wrap(delta_desc, nullptr)},
+                               {DNNL_ARG_DST, Wrap(gradient_desc, nullptr)}}});
+}
+
+template <typename Number>
+void ShardNetwork<Number>::Products::AddBackward(const HeadShape& shape, const LayerMemory& at) {
+  if (at.layer == 0) {  // nothing is behind the features
+    backward.emplace_back();
+    return;
+  }
+  const bool begins_block = shape.EndsBlock(at.layer + 2);
+  dnnl::post_ops add_skip;
+  if (begins_block) add_skip.append_sum(1.0F);
+  dnnl::primitive_attr attributes;
+  attributes.set_post_ops(add_skip);
+  const auto delta_desc = Rows(at.rows, shape.width);
+  const auto weights_transposed = Transposed(shape.width, static_cast<std::size_t>(shape.width));
+  const dnnl::matmul::primitive_desc description(
+      {delta_desc, weights_transposed, delta_desc}, attributes, engine);
+  backward.push_back({dnnl::matmul(description),
+                      {{DNNL_ARG_SRC, Wrap(delta_desc, nullptr)},
+                       {DNNL_ARG_WEIGHTS, Wrap(weights_transposed, at.weights)},
+                       {DNNL_ARG_DST, Wrap(delta_desc, nullptr)}}});
+}
 
 template <typename Number>
 ShardNetwork<Number>::ShardNetwork(const ParameterLayout& layout,
@@ -225,57 +298,16 @@ ShardNetwork<Number>::ShardNetwork(const ParameterLayout& layout,
   output_weights_.resize((width + 1) * kLanes);
 
   for (int layer = 0; layer + 1 < shape.layer_count(); ++layer) {
-    const int inputs = shape.LayerInputs(layer);
     const auto index = static_cast<std::size_t>(layer);
-    const std::vector<Number>& in = layer == 0 ? inputs_ : hidden_[index - 1];
-    const Number* weights = narrow_parameters + layout.WeightsBegin(layer);
-
-    dnnl::post_ops relu;
-    if (shape.EndsBlock(layer)) relu.append_sum(1.0F);
-    relu.append_eltwise(1.0F, dnnl::algorithm::eltwise_relu, 0.0F, 0.0F);
-    dnnl::primitive_attr forward_attributes;
-    forward_attributes.set_post_ops(relu);
-    const auto in_desc = Products::Rows(rows, inputs);
-    const auto out_desc = Products::Rows(rows, shape.width);
-    const auto weights_desc = Products::Rows(static_cast<std::size_t>(inputs), shape.width);
-    const auto bias_desc = Products::Rows(1, shape.width, memory::data_type::f32);
-    const dnnl::matmul::primitive_desc forward(
-        {in_desc, weights_desc, bias_desc, out_desc}, forward_attributes, products_->engine);
-    products_->forward.push_back(
-        {dnnl::matmul(forward),
-         {{DNNL_ARG_SRC, products_->Wrap(in_desc, in.data())},
-          {DNNL_ARG_WEIGHTS, products_->Wrap(weights_desc, weights)},
-          {DNNL_ARG_BIAS, products_->Wrap(bias_desc, parameters + layout.BiasBegin(layer))},
-          {DNNL_ARG_DST, products_->Wrap(out_desc, hidden_[index].data())}}});
-
-    const auto in_transposed = Products::Transposed(inputs, rows);
-    const auto gradient_desc =
-        Products::Rows(static_cast<std::size_t>(inputs), shape.width, memory::data_type::f32);
-    const dnnl::matmul::primitive_desc weight_gradient({in_transposed, out_desc, gradient_desc},
-                                                       products_->engine);
-    products_->weight_gradients.push_back(
-        {dnnl::matmul(weight_gradient),
-         {{DNNL_ARG_SRC, products_->Wrap(in_transposed, in.data())},
-          {DNNL_ARG_WEIGHTS, products_->Wrap(out_desc, nullptr)},
-          {DNNL_ARG_DST, products_->Wrap(gradient_desc, nullptr)}}});
-
-    if (layer == 0) {
-      products_->backward.emplace_back();
-      continue;
-    }
-    const bool begins_block = shape.EndsBlock(layer + 2);
-    dnnl::post_ops add_skip;
-    if (begins_block) add_skip.append_sum(1.0F);
-    dnnl::primitive_attr backward_attributes;
-    backward_attributes.set_post_ops(add_skip);
-    const auto weights_transposed = Products::Transposed(shape.width, width);
-    const dnnl::matmul::primitive_desc backward(
-        {out_desc, weights_transposed, out_desc}, backward_attributes, products_->engine);
-    products_->backward.push_back(
-        {dnnl::matmul(backward),
-         {{DNNL_ARG_SRC, products_->Wrap(out_desc, nullptr)},
-          {DNNL_ARG_WEIGHTS, products_->Wrap(weights_transposed, weights)},
-          {DNNL_ARG_DST, products_->Wrap(out_desc, nullptr)}}});
+    const LayerMemory memory{layer,
+                             rows,
+                             layer == 0 ? inputs_.data() : hidden_[index - 1].data(),
+                             narrow_parameters + layout.WeightsBegin(layer),
+                             parameters + layout.BiasBegin(layer),
+                             hidden_[index].data()};
+    products_->AddForward(shape, memory);
+    products_->AddWeightGradient(shape, memory);
+    products_->AddBackward(shape, memory);
   }
 }
 

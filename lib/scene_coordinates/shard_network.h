@@ -71,6 +71,7 @@ class ShardNetwork {
   void Run(OutputLoss& loss, std::span<float> gradient);
 
  private:
+  struct LayerMemory;
   struct Products;
 
   void Forward();

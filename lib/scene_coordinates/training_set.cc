@@ -327,10 +327,14 @@ Result<PreparedTraining> Preparation::Run(const std::function<void(double)>& pro
     }
   }
 
-  const auto prototype = MakeExtractor();
-  auto whitening = FitWhitening(samples, prototype->dimension(), config_.whitened_dimensions);
-  if (!whitening) return std::move(whitening).error();
-  whitening_ = std::move(*whitening);
+  if (config_.whitening != nullptr) {
+    whitening_ = *config_.whitening;
+  } else {
+    const int dimension = MakeExtractor()->dimension();
+    auto whitening = FitWhitening(samples, dimension, config_.whitened_dimensions);
+    if (!whitening) return std::move(whitening).error();
+    whitening_ = std::move(*whitening);
+  }
 
   PreparedTraining prepared;
   prepared.set.dimension = whitening_.outputs;

@@ -49,6 +49,8 @@ struct TrainingSetConfig {
   double max_gamma = 1.5;         ///< >= 1; an exponent or its inverse.
   double max_blur_px = 1.2;       ///< >= 0; standard deviation in working pixels.
   bool measure_depth = true;      ///< Find depths between neighbouring images by their poses.
+  /// Used instead of fitting one, if there is one: all regions of a map share theirs.
+  const FeatureWhitening* whitening = nullptr;
   std::uint64_t seed = 1;
   int threads = 1;  ///< > 0; the result does not depend on it.
 };
