@@ -27,6 +27,8 @@ class FeatureExtractor {
   FeatureExtractor() = default;
   FeatureExtractor(const FeatureExtractor&) = delete;
   FeatureExtractor& operator=(const FeatureExtractor&) = delete;
+  FeatureExtractor(FeatureExtractor&&) = delete;
+  FeatureExtractor& operator=(FeatureExtractor&&) = delete;
   virtual ~FeatureExtractor() = default;
 
   [[nodiscard]] virtual int dimension() const = 0;

@@ -33,6 +33,34 @@ struct LayerPlan {
   memory::data_type out_type = memory::data_type::f32;
 };
 
+/// How a head's layers use three buffers: the hidden values that a block adds to stay in `hidden`,
+/// and the block's own go through the other two back to it.
+std::vector<LayerPlan> PlanLayers(const HeadShape& shape, memory::data_type type) {
+  std::vector<LayerPlan> plans;
+  std::size_t hidden = 0;
+  const int last = shape.layer_count() - 1;
+  for (int index = 0; index <= last; ++index) {
+    LayerPlan plan;
+    plan.inputs = shape.LayerInputs(index);
+    plan.outputs = shape.LayerOutputs(index);
+    plan.relu = index < last;
+    plan.in_type = index < last ? type : memory::data_type::f32;
+    plan.out_type = index + 1 < last ? type : memory::data_type::f32;
+    const int place_in_block = index >= 1 && index <= 3 * shape.blocks ? (index - 1) % 3 : -1;
+    if (place_in_block < 0) {
+      plan.in_buffer = hidden;
+      hidden = (hidden + 1) % 3;
+      plan.out_buffer = hidden;
+    } else {
+      plan.in_buffer = (hidden + static_cast<std::size_t>(place_in_block)) % 3;
+      plan.out_buffer = (plan.in_buffer + 1) % 3;
+      plan.adds_to_output = place_in_block == 2;
+    }
+    plans.push_back(plan);
+  }
+  return plans;
+}
+
 struct Step {
   dnnl::matmul matmul;
   std::unordered_map<int, memory> arguments;
@@ -140,29 +168,9 @@ Result<std::unique_ptr<OnednnLayers>> OnednnLayers::ForHead(const Head& head,
       network->buffers.emplace_back(Rows(kBlockRows, widest, memory::data_type::f32),
                                     network->engine);
     }
-    // The hidden values that a block adds to stay in `hidden`; the block's own go back and forth
-    // between the other two.
-    std::size_t hidden = 0;
-    const int last = head.shape.layer_count() - 1;
-    for (int index = 0; index <= last; ++index) {
-      LayerPlan plan;
-      plan.inputs = head.shape.LayerInputs(index);
-      plan.outputs = head.shape.LayerOutputs(index);
-      plan.relu = index < last;
-      plan.in_type = index < last ? network->type : memory::data_type::f32;
-      plan.out_type = index + 1 < last ? network->type : memory::data_type::f32;
-      const int place_in_block =
-          index >= 1 && index <= 3 * head.shape.blocks ? (index - 1) % 3 : -1;
-      if (place_in_block < 0) {
-        plan.in_buffer = hidden;
-        plan.out_buffer = hidden = (hidden + 1) % 3;
-      } else {
-        plan.in_buffer = (hidden + static_cast<std::size_t>(place_in_block)) % 3;
-        plan.out_buffer = (plan.in_buffer + 1) % 3;
-        plan.adds_to_output = place_in_block == 2;
-      }
-      const HeadLayer& layer = head.layers[static_cast<std::size_t>(index)];
-      network->AddLayer(plan, layer.weights, layer.bias);
+    const std::vector<LayerPlan> plans = PlanLayers(head.shape, network->type);
+    for (std::size_t index = 0; index < plans.size(); ++index) {
+      network->AddLayer(plans[index], head.layers[index].weights, head.layers[index].bias);
     }
     return std::unique_ptr<OnednnLayers>(new OnednnLayers(std::move(network)));
   } catch (const dnnl::error& error) {

@@ -44,6 +44,8 @@ class OnednnLayers {
 
   OnednnLayers(const OnednnLayers&) = delete;
   OnednnLayers& operator=(const OnednnLayers&) = delete;
+  OnednnLayers(OnednnLayers&&) = delete;
+  OnednnLayers& operator=(OnednnLayers&&) = delete;
 
  private:
   struct Network;

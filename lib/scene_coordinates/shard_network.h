@@ -41,6 +41,8 @@ class OutputLoss {
   OutputLoss() = default;
   OutputLoss(const OutputLoss&) = delete;
   OutputLoss& operator=(const OutputLoss&) = delete;
+  OutputLoss(OutputLoss&&) = delete;
+  OutputLoss& operator=(OutputLoss&&) = delete;
   virtual ~OutputLoss() = default;
   virtual void Evaluate(std::span<const float> outputs, std::span<float> gradients) = 0;
 };
@@ -62,6 +64,8 @@ class ShardNetwork {
   ~ShardNetwork();
   ShardNetwork(const ShardNetwork&) = delete;
   ShardNetwork& operator=(const ShardNetwork&) = delete;
+  ShardNetwork(ShardNetwork&&) = delete;
+  ShardNetwork& operator=(ShardNetwork&&) = delete;
 
   /// Where the features of row r go: layout's shape.inputs values.
   [[nodiscard]] std::span<Number> InputRow(std::size_t row);
