@@ -1,5 +1,6 @@
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <iterator>
 #include <numbers>

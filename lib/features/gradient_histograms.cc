@@ -92,7 +92,8 @@ Result<void> GradientHistograms::Resize(const GrayImage& image, std::vector<floa
                              config_.image_width,
                              config_.image_height)};
   }
-  working.resize(static_cast<std::size_t>(config_.working_width * config_.working_height));
+  working.resize(static_cast<std::size_t>(config_.working_width) *
+                 static_cast<std::size_t>(config_.working_height));
   // OpenCV has no view of constant memory; nothing is written to the input.
   const cv::Mat in(
       image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.pixels.data()));
@@ -129,8 +130,8 @@ void GradientHistograms::ExtractFromWorkingImage(std::span<const float> working,
     features.pixels[index] = centre;
     const std::span<float> cell = std::span(features.values).subspan(index * size, size);
     for (int octave = 0; octave < config_.octaves; ++octave) {
-      const std::span<float> histogram =
-          cell.subspan(static_cast<std::size_t>(octave * kDescriptor), kDescriptor);
+      const std::span<float> histogram = cell.subspan(
+          static_cast<std::size_t>(octave) * static_cast<std::size_t>(kDescriptor), kDescriptor);
       maps_.Sample(octave, centre.x(), centre.y(), histogram);
       cell[static_cast<std::size_t>(config_.octaves * kDescriptor + octave)] =
           NormaliseHistogram(histogram);

@@ -206,14 +206,14 @@ void GradientMaps::Compute(std::span<const float> pixels, int width, int height,
     octave.step = StepOfOctave(index);
     octave.image_width = width >> index;
     octave.image_height = height >> index;
-    octave.image.resize(static_cast<std::size_t>(octave.image_width * octave.image_height));
+    octave.image.resize(static_cast<std::size_t>(octave.image_width) *
+                        static_cast<std::size_t>(octave.image_height));
     if (index == 0) {
       std::copy(pixels.begin(), pixels.end(), octave.image.begin());
     } else {
       const Octave& finer = octaves_[static_cast<std::size_t>(index - 1)];
       for (int y = 0; y < octave.image_height; ++y) {
-        const float* upper =
-            finer.image.data() + static_cast<std::ptrdiff_t>(2 * y) * finer.image_width;
+        const float* upper = finer.image.data() + std::ptrdiff_t{2} * y * finer.image_width;
         HalveRow(upper,
                  upper + finer.image_width,
                  octave.image_width,
@@ -292,7 +292,10 @@ void GradientMaps::Sample(int octave, float x, float y, std::span<float> histogr
         std::clamp(centre.column + kPointOffsets[point][0] / maps.step, 0, maps.columns - 1);
     const int row = std::clamp(centre.row + kPointOffsets[point][1] / maps.step, 0, maps.rows - 1);
     const std::vector<float>& map = point < kFinePoints ? maps.fine : maps.coarse;
-    const std::size_t from = static_cast<std::size_t>(row * maps.columns + column) * kBins;
+    const std::size_t from =
+        (static_cast<std::size_t>(row) * static_cast<std::size_t>(maps.columns) +
+         static_cast<std::size_t>(column)) *
+        kBins;
     std::copy_n(map.begin() + static_cast<std::ptrdiff_t>(from),
                 kBins,
                 histogram.begin() + static_cast<std::ptrdiff_t>(point * kBins));
@@ -314,7 +317,7 @@ float GradientMaps::Texture(int octave, float x, float y) const {
   const int column = std::clamp(centre.column, 0, maps.columns - 1);
   const int row = std::clamp(centre.row, 0, maps.rows - 1);
   const float* bins =
-      maps.fine.data() + static_cast<std::ptrdiff_t>(row * maps.columns + column) * kBins;
+      maps.fine.data() + (static_cast<std::ptrdiff_t>(row) * maps.columns + column) * kBins;
   float sum = 0.0F;
   for (int bin = 0; bin < kBins; ++bin) {
     sum += bins[bin];

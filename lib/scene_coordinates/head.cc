@@ -80,7 +80,8 @@ Head MakeRandomHead(const HeadShape& shape, std::uint64_t seed) {
     const double gain = shape.EndsBlock(index) ? 0.5 : 1.0;
     const double sigma = is_last ? 0.0 : gain * std::sqrt(2.0 / layer.inputs);
     std::normal_distribution<double> weight(0.0, 1.0);
-    layer.weights.resize(static_cast<std::size_t>(layer.inputs * layer.outputs));
+    layer.weights.resize(static_cast<std::size_t>(layer.inputs) *
+                         static_cast<std::size_t>(layer.outputs));
     for (float& value : layer.weights) {
       value = static_cast<float>(sigma * weight(engine));
     }

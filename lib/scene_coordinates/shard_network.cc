@@ -140,13 +140,14 @@ RELOCD_DEFINE_ROW_LOOPS(Bfloat16)
 ParameterLayout::ParameterLayout(const HeadShape& shape) : shape_(shape) {
   for (int layer = 0; layer < shape.layer_count(); ++layer) {
     begins_.push_back(size_);
-    size_ += static_cast<std::size_t>((shape.LayerInputs(layer) + 1) * shape.LayerOutputs(layer));
+    size_ += static_cast<std::size_t>(shape.LayerInputs(layer) + 1) *
+             static_cast<std::size_t>(shape.LayerOutputs(layer));
   }
 }
 
 std::size_t ParameterLayout::BiasBegin(int layer) const {
-  return WeightsBegin(layer) +
-         static_cast<std::size_t>(shape_.LayerInputs(layer) * shape_.LayerOutputs(layer));
+  return WeightsBegin(layer) + static_cast<std::size_t>(shape_.LayerInputs(layer)) *
+                                   static_cast<std::size_t>(shape_.LayerOutputs(layer));
 }
 
 std::vector<float> FlattenHead(const Head& head, const ParameterLayout& layout) {
@@ -168,7 +169,8 @@ void UnflattenHead(const ParameterLayout& layout, std::span<const float> paramet
     layer.inputs = layout.shape().LayerInputs(index);
     layer.outputs = layout.shape().LayerOutputs(index);
     const auto weights = parameters.subspan(layout.WeightsBegin(index));
-    const auto weight_count = static_cast<std::size_t>(layer.inputs * layer.outputs);
+    const auto weight_count =
+        static_cast<std::size_t>(layer.inputs) * static_cast<std::size_t>(layer.outputs);
     layer.weights.assign(weights.begin(),
                          weights.begin() + static_cast<std::ptrdiff_t>(weight_count));
     const auto bias = parameters.subspan(layout.BiasBegin(index));
