@@ -85,6 +85,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(ProcessTableTest, HasOneCameradForEachCamera) {
   const auto table = MakeProcessTable(SupervisionConfig{}, kContext);
   std::vector<std::string> names;
+  names.reserve(table.size());
   for (const ProcessSpec& spec : table)
     names.push_back(spec.name);
   EXPECT_THAT(

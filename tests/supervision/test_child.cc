@@ -41,8 +41,8 @@ class TestChild {
         manager_(ServiceManager::FromEnvironment()) {
     ::sigemptyset(&term_);
     ::sigaddset(&term_, SIGTERM);
-    ::sigprocmask(SIG_BLOCK, nullptr, &inherited_);
-    ::sigprocmask(SIG_BLOCK, &term_, nullptr);
+    ::pthread_sigmask(SIG_BLOCK, nullptr, &inherited_);
+    ::pthread_sigmask(SIG_BLOCK, &term_, nullptr);
     Log("start");
   }
 
