@@ -29,10 +29,10 @@ struct SupervisorOptions {
   Duration late = std::chrono::milliseconds(500);
 
   /// Of all children, as `NAME=value`.
-  std::vector<std::string> environment;
+  std::vector<std::string> environment{};
 
   /// Told what happens, one line each, with syslog's priority (3 error, 4 warning, 6 info).
-  std::function<void(int priority, const std::string& text)> on_event;
+  std::function<void(int priority, const std::string& text)> on_event{};
 };
 
 /// How one child is.
