@@ -49,8 +49,13 @@ bool AppendOdometry(std::span<const std::uint8_t> bytes,
                     std::string& text) {
   const auto message = DecodeBounded<odometry_t>(bytes);
   if (!message) return false;
-  const PlanarPose pose{.X_WB = Pose2(message->x_OB_m, message->y_OB_m, message->yaw_OB_rad)};
-  AppendPose(message->mono_ns - origin_ns, pose, message->flags, text);
+  fmt::format_to(std::back_inserter(text),
+                 "{},{},{},{},{}\n",
+                 message->mono_ns - origin_ns,
+                 message->x_OB_m,
+                 message->y_OB_m,
+                 message->yaw_OB_rad,
+                 message->flags);
   return true;
 }
 
@@ -78,20 +83,20 @@ bool AppendCameraPose(std::span<const std::uint8_t> bytes,
 }  // namespace
 
 Result<LogCsv> LogCsv::ForChannel(const std::string& channel, std::int64_t time_origin_ns) {
-  const auto bind = [time_origin_ns](auto* append) {
-    return LogCsv([append, time_origin_ns](std::span<const std::uint8_t> bytes, std::string& text) {
-      return append(bytes, time_origin_ns, text);
-    });
+  constexpr const char* kPoseHeader =
+      "time_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,status\n";
+  constexpr const char* kOdometryHeader = "time_ns,x_m,y_m,heading_rad,flags\n";
+  const auto make = [time_origin_ns](const char* header, auto* append) {
+    return LogCsv(header,
+                  [append, time_origin_ns](std::span<const std::uint8_t> bytes, std::string& text) {
+                    return append(bytes, time_origin_ns, text);
+                  });
   };
-  if (channel == channels::kLocalization.name) return bind(&AppendLocalization);
-  if (channel == channels::kOdometry.name) return bind(&AppendOdometry);
-  if (channel == channels::kCameraPose.name) return bind(&AppendCameraPose);
+  if (channel == channels::kLocalization.name) return make(kPoseHeader, &AppendLocalization);
+  if (channel == channels::kOdometry.name) return make(kOdometryHeader, &AppendOdometry);
+  if (channel == channels::kCameraPose.name) return make(kPoseHeader, &AppendCameraPose);
   return Error{ErrorKind::kInvalidInput,
                fmt::format("--channel is '{}', must be {}", channel, kChannels)};
-}
-
-std::string LogCsv::Header() const {
-  return "time_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,status\n";
 }
 
 }  // namespace relocd

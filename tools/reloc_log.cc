@@ -66,7 +66,7 @@ Result<int> Export(const ExportOptions& options) {
   if (!reader) return std::move(reader).error();
   auto csv = LogCsv::ForChannel(options.channel, options.time_origin_ns);
   if (!csv) return std::move(csv).error();
-  std::string text = csv->Header();
+  std::string text = csv->header();
   std::int64_t undecodable = 0;
   while (const auto event = reader->Next()) {
     if (event->channel != options.channel) continue;

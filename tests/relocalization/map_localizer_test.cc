@@ -132,8 +132,8 @@ TEST(InferenceConfigTest, NamesTheFieldThatIsOutOfRange) {
   config.threads = 0;
   EXPECT_THAT(config.Validate().error().message, HasSubstr("threads is 0, must be in [1, 64]"));
   config = {};
-  config.max_image_age_ms = 0;
-  EXPECT_THAT(config.Validate().error().message, HasSubstr("max_image_age_ms is 0, must be in"));
+  config.max_image_age_ms = -1;
+  EXPECT_THAT(config.Validate().error().message, HasSubstr("max_image_age_ms is -1, must be in"));
   config = {};
   config.pose.max_tries = 0;
   EXPECT_THAT(config.Validate().error().message, HasSubstr("pose.max_tries is 0, must be in"));
