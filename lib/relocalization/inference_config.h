@@ -10,14 +10,17 @@ namespace relocd {
 /// How images become camera poses.
 struct InferenceConfig {
   std::string map_path{};
-  int threads = 2;
+  int threads = 1;
   int max_image_age_ms = 500;
   CameraPoseOptions pose;
 
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("map_path", self.map_path, "the map, made by `reloc map train`");
-    visit("threads", self.threads, "in [1, 64]; of the network");
+    visit("threads",
+          self.threads,
+          "in [1, 64]; of the network; they wait for each other actively, so no more than cores "
+          "are free");
     visit("max_image_age_ms",
           self.max_image_age_ms,
           "in [0, 60000]; older images are passed over, and counted; 0: none is too old, as when "
