@@ -14,7 +14,7 @@ std::optional<double> ParseDouble(std::string_view text);
 /// overflows.
 std::optional<std::int64_t> ParseInt64(std::string_view text);
 
-/// `text` without blanks, tabs and carriage returns at its ends.
+/// `text` without blanks, tabs and line ends at its ends.
 std::string_view Trim(std::string_view text);
 
 }  // namespace relocd

@@ -21,7 +21,7 @@ TEST(ParseNumberTest, RefusesAnIntegerThatOverflows) {
 }
 
 TEST(ParseNumberTest, TrimsBothEnds) {
-  EXPECT_EQ(Trim(" \ta b\r"), "a b");
+  EXPECT_EQ(Trim(" \ta b\r\n"), "a b");
   EXPECT_EQ(Trim("  "), "");
 }
 

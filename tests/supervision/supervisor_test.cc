@@ -138,7 +138,7 @@ TEST_F(SupervisorTest, StartsAtOnceWithoutADependencyThatFailed) {
 
 TEST_F(SupervisorTest, RestartsAChildThatWasKilledInTwoTenthsOfASecond) {
   // With the field's back-off, each time anew.
-  auto supervisor = Supervisor::Create({.backoff_reset = 1ms});
+  auto supervisor = Supervisor::Create({.backoff_reset = 1ms, .environment = {}, .on_event = {}});
   ASSERT_TRUE(supervisor);
   supervisor_.emplace(std::move(supervisor).value());
   Apply({Child("odometry", {"ready", "wait"})});
