@@ -214,12 +214,12 @@ void InferenceNode::Count(const camera_pose_t& answer, MonotonicTime now) {
 }
 
 void InferenceNode::RaiseLevel(const ClockReading& now, NodeStatus& status) const {
-  constexpr double kPatience_s = 2.0;
+  constexpr double kPatience = 2.0;
   if (!last_image_) {
     status.Raise(status_t::WARNING, "no image yet");
     return;
   }
-  if (const double age_s = ToSeconds(now.monotonic - *last_image_); age_s > kPatience_s) {
+  if (const double age_s = ToSeconds(now.monotonic - *last_image_); age_s > kPatience) {
     status.Raise(status_t::WARNING, fmt::format("no image for {:.1f} s", age_s));
     return;
   }
@@ -228,7 +228,7 @@ void InferenceNode::RaiseLevel(const ClockReading& now, NodeStatus& status) cons
     status.Raise(status_t::WARNING, fmt::format("no pose yet: {}", last_reason_));
     return;
   }
-  if (const double age_s = ToSeconds(now.monotonic - *last_pose_); age_s > kPatience_s) {
+  if (const double age_s = ToSeconds(now.monotonic - *last_pose_); age_s > kPatience) {
     status.Raise(status_t::WARNING, fmt::format("no pose for {:.1f} s: {}", age_s, last_reason_));
   }
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 namespace relocd {
@@ -19,8 +20,8 @@ class LatencyWindow {
   [[nodiscard]] double Percentile(double share) const {
     if (size_ == 0) return 0.0;
     std::array<double, kSize> sorted = values_;
-    const auto rank = static_cast<std::size_t>(share * static_cast<double>(size_ - 1) + 0.5);
-    const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(rank);
+    const auto rank = std::lround(share * static_cast<double>(size_ - 1));
+    const auto nth = sorted.begin() + rank;
     std::nth_element(sorted.begin(), nth, sorted.begin() + static_cast<std::ptrdiff_t>(size_));
     return *nth;
   }

@@ -25,14 +25,13 @@ Pose3 WorldPose(const CameraFromWorld& X_CM, const Eigen::Vector3d& p_WM) {
   return {R_WC, p_WM - R_WC * X_CM.p_CW};
 }
 
-std::vector<CameraFromWorld> PriorHypotheses(const std::optional<Pose3>& X_WC_prior,
+std::vector<CameraFromWorld> PriorHypotheses(const std::optional<Pose3>& prior,
                                              const Eigen::Vector3d& p_WM) {
-  if (!X_WC_prior || !X_WC_prior->translation().allFinite() ||
-      !X_WC_prior->rotation().coeffs().allFinite()) {
+  if (!prior || !prior->translation().allFinite() || !prior->rotation().coeffs().allFinite()) {
     return {};
   }
-  const Eigen::Matrix3d R_CW = X_WC_prior->R().transpose();
-  return {{.R_CW = R_CW, .p_CW = R_CW * (p_WM - X_WC_prior->translation())}};
+  const Eigen::Matrix3d R_CW = prior->R().transpose();
+  return {{.R_CW = R_CW, .p_CW = R_CW * (p_WM - prior->translation())}};
 }
 
 /// The inlier threshold in pixels of this camera.
@@ -165,7 +164,7 @@ std::string_view Name(CameraPoseStatus status) {
 CameraPoseResult EstimateCameraPose(std::span<const Correspondence> correspondences,
                                     const PinholeCamera& camera,
                                     const CameraPoseOptions& options,
-                                    const std::optional<Pose3>& X_WC_prior,
+                                    const std::optional<Pose3>& prior,
                                     std::uint64_t seed) {
   const PackedCorrespondences packed(correspondences, camera, seed);
   const double threshold_px = ThresholdPx(options, packed);
@@ -175,7 +174,7 @@ CameraPoseResult EstimateCameraPose(std::span<const Correspondence> corresponden
                                       .kept = options.refined_hypotheses,
                                       .scored_points = options.scored_points,
                                       .threshold_px = threshold_px},
-                                     PriorHypotheses(X_WC_prior, packed.p_WM()),
+                                     PriorHypotheses(prior, packed.p_WM()),
                                      seed);
   CameraPoseResult result;
   result.correspondences = static_cast<int>(correspondences.size());

@@ -19,7 +19,7 @@ struct PoseCalibration {
   double covariance_scale = 1.0;           ///< > 0; multiplies the covariance of the equations.
   double translation_floor_sigma_m = 0.0;  ///< >= 0; added, in squares, to each axis.
   double rotation_floor_sigma_rad = 0.0;   ///< >= 0
-  double min_confidence = 0.03;            ///< in [0, 1]; with less support there is no pose.
+  double min_confidence = 0.15;            ///< in [0, 1]; with less support there is no pose.
 };
 
 /// How a camera pose is searched.
@@ -91,11 +91,11 @@ struct CameraPoseResult {
 ///
 /// @param camera   of the image that the pixels are in.
 /// @param options  valid in the sense of its Validate().
-/// @param X_WC_prior  a pose to try as one more hypothesis: it competes on equal terms.
+/// @param prior  of X_WC: a pose to try as one more hypothesis: it competes on equal terms.
 CameraPoseResult EstimateCameraPose(std::span<const Correspondence> correspondences,
                                     const PinholeCamera& camera,
                                     const CameraPoseOptions& options,
-                                    const std::optional<Pose3>& X_WC_prior,
+                                    const std::optional<Pose3>& prior,
                                     std::uint64_t seed);
 
 }  // namespace relocd

@@ -11,14 +11,14 @@ namespace relocd {
 namespace {
 
 /// Coordinates beyond this are no place on a map, and their squares would not fit a float.
-constexpr double kMaxCoordinate_m = 1e8;
+constexpr double kMaxCoordinate = 1e8;
 
 /// Draws that no sampling uses: its counters start from zero.
 constexpr std::uint64_t kShuffleCounters = std::uint64_t{1} << 62;
 
 bool IsUsable(const Correspondence& correspondence) {
   return correspondence.pixel.allFinite() && correspondence.p_WP.allFinite() &&
-         correspondence.p_WP.cwiseAbs().maxCoeff() < kMaxCoordinate_m;
+         correspondence.p_WP.cwiseAbs().maxCoeff() < kMaxCoordinate;
 }
 
 /// The median of each coordinate, which outliers do not move far.

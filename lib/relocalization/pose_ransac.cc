@@ -52,7 +52,7 @@ std::optional<CameraFromWorld> ConfirmedByFourth(const PackedCorrespondences& co
   double least = threshold_px * threshold_px;
   for (const CameraFromWorld& X_CM : solutions) {
     const Eigen::Vector3d p_CP = X_CM * correspondences.p_MP(fourth);
-    if (p_CP.z() < kMinDepth_m) continue;
+    if (p_CP.z() < kMinDepth) continue;
     const Eigen::Vector2d projected =
         correspondences.focal().cwiseProduct(p_CP.head<2>()) / p_CP.z();
     const double error = (projected - correspondences.pixel(fourth)).squaredNorm();

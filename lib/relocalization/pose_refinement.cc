@@ -38,6 +38,52 @@ const FloatLanes& Lanes(const float* data) {
   return *reinterpret_cast<const FloatLanes*>(data);
 }
 
+/// Of kLanes correspondences: the residuals, their weights, and the derivatives of the residuals.
+struct Linearised {
+  FloatLanes eu;
+  FloatLanes ev;
+  FloatLanes ratio;  ///< Squared error over squared threshold.
+  FloatLanes fade;   ///< 1 / (1 + ratio)
+  FloatLanes w;
+  FloatLanes u[6];  ///< d eu by the left perturbation (rho, omega) of X_CM.
+  FloatLanes v[6];
+};
+
+[[gnu::always_inline]] inline void Linearise(const PackedCorrespondences& c,
+                                             std::size_t i,
+                                             const View& view,
+                                             Linearised& l) {
+  const FloatLanes zero{};
+  const auto& [R, t, fx, fy, inverse_squared_threshold] = view;
+  const FloatLanes px = Lanes(c.x() + i);
+  const FloatLanes py = Lanes(c.y() + i);
+  const FloatLanes pz = Lanes(c.z() + i);
+  const FloatLanes depth = R[6] * px + R[7] * py + R[8] * pz + t[2];
+  const auto in_front = depth > kMinDepth;
+  const FloatLanes inverse_depth = in_front ? 1.0F / depth : zero;
+  const FloatLanes x = (R[0] * px + R[1] * py + R[2] * pz + t[0]) * inverse_depth;
+  const FloatLanes y = (R[3] * px + R[4] * py + R[5] * pz + t[1]) * inverse_depth;
+  l.eu = fx * x - Lanes(c.u() + i);
+  l.ev = fy * y - Lanes(c.v() + i);
+  l.ratio = (l.eu * l.eu + l.ev * l.ev) * inverse_squared_threshold;
+  l.fade = 1.0F / (1.0F + l.ratio);
+  l.w = in_front ? l.fade * l.fade : zero;
+
+  // A point moves by rho + omega x p_CP.
+  l.u[0] = fx * inverse_depth;
+  l.u[1] = zero;
+  l.u[2] = -fx * x * inverse_depth;
+  l.u[3] = -fx * x * y;
+  l.u[4] = fx * (1.0F + x * x);
+  l.u[5] = -fx * y;
+  l.v[0] = zero;
+  l.v[1] = fy * inverse_depth;
+  l.v[2] = -fy * y * inverse_depth;
+  l.v[3] = -fy * (1.0F + y * y);
+  l.v[4] = fy * x * y;
+  l.v[5] = fy * x;
+}
+
 RELOCD_CLONE_FOR_AVX2
 void AddBlock(const PackedCorrespondences& c,
               std::size_t begin,
@@ -45,52 +91,24 @@ void AddBlock(const PackedCorrespondences& c,
               const View& view,
               Sums& sums) {
   FloatLanes terms[kTerms] = {};
-  const FloatLanes zero{};
-  const auto& [R, t, fx, fy, inverse_squared_threshold] = view;
   for (std::size_t i = begin; i < end; i += kLanes) {
-    const FloatLanes px = Lanes(c.x() + i);
-    const FloatLanes py = Lanes(c.y() + i);
-    const FloatLanes pz = Lanes(c.z() + i);
-    const FloatLanes depth = R[6] * px + R[7] * py + R[8] * pz + t[2];
-    const auto in_front = depth > kMinDepth_m;
-    const FloatLanes inverse_depth = in_front ? 1.0F / depth : zero;
-    const FloatLanes x = (R[0] * px + R[1] * py + R[2] * pz + t[0]) * inverse_depth;
-    const FloatLanes y = (R[3] * px + R[4] * py + R[5] * pz + t[1]) * inverse_depth;
-    const FloatLanes eu = fx * x - Lanes(c.u() + i);
-    const FloatLanes ev = fy * y - Lanes(c.v() + i);
-
-    const FloatLanes ratio = (eu * eu + ev * ev) * inverse_squared_threshold;
-    const FloatLanes fade = 1.0F / (1.0F + ratio);
-    const FloatLanes w = in_front ? fade * fade : zero;
-    const FloatLanes weu = w * eu;
-    const FloatLanes wev = w * ev;
-
-    // A point moves by rho + omega x p_CP under the left perturbation (rho, omega) of X_CM.
-    const FloatLanes u[6] = {fx * inverse_depth,
-                             zero,
-                             -fx * x * inverse_depth,
-                             -fx * x * y,
-                             fx * (1.0F + x * x),
-                             -fx * y};
-    const FloatLanes v[6] = {zero,
-                             fy * inverse_depth,
-                             -fy * y * inverse_depth,
-                             -fy * (1.0F + y * y),
-                             fy * x * y,
-                             fy * x};
+    Linearised l;
+    Linearise(c, i, view, l);
+    const FloatLanes weu = l.w * l.eu;
+    const FloatLanes wev = l.w * l.ev;
     std::size_t term = 0;
     for (std::size_t row = 0; row < 6; ++row) {
-      const FloatLanes wu = w * u[row];
-      const FloatLanes wv = w * v[row];
+      const FloatLanes wu = l.w * l.u[row];
+      const FloatLanes wv = l.w * l.v[row];
       for (std::size_t column = row; column < 6; ++column) {
-        terms[term++] += wu * u[column] + wv * v[column];
+        terms[term++] += wu * l.u[column] + wv * l.v[column];
       }
-      terms[kGradient + row] += u[row] * weu + v[row] * wev;
+      terms[kGradient + row] += l.u[row] * weu + l.v[row] * wev;
     }
-    terms[kWeight] += w;
+    terms[kWeight] += l.w;
     terms[kSquaredInfluence] += weu * weu + wev * wev;
-    // Half the divergence of w e: (1 - r) / (1 + r)^3 for r = (e / threshold)^2.
-    terms[kInfluenceSlope] += w * fade * (1.0F - ratio);
+    // Half the divergence of w e: (1 - ratio) / (1 + ratio)^3.
+    terms[kInfluenceSlope] += l.w * l.fade * (1.0F - l.ratio);
   }
   for (std::size_t term = 0; term < kTerms; ++term) {
     for (std::size_t lane = 0; lane < kLanes; ++lane)
@@ -121,15 +139,15 @@ Sums AddAll(const PackedCorrespondences& c,
 }
 
 Matrix6d HessianOf(const Sums& sums) {
-  Matrix6d H;
+  Matrix6d hessian;
   std::size_t term = 0;
   for (Eigen::Index row = 0; row < 6; ++row) {
     for (Eigen::Index column = row; column < 6; ++column) {
-      H(row, column) = sums[term++];
-      H(column, row) = H(row, column);
+      hessian(row, column) = sums[term++];
+      hessian(column, row) = hessian(row, column);
     }
   }
-  return H;
+  return hessian;
 }
 
 /// A Hessian whose rows and columns were scaled to a unit diagonal, so that metres and radians
@@ -139,14 +157,14 @@ struct ScaledHessian {
   Eigen::LDLT<Matrix6d> factors;
 };
 
-std::optional<ScaledHessian> Factor(const Matrix6d& H) {
+std::optional<ScaledHessian> Factor(const Matrix6d& hessian) {
   // Points on a line, which leave a rotation free, give up to 2e-6 by rounding alone. The view
   // along a road gives 1e-2.
   constexpr double kMinPivot = 1e-5;
-  if (!H.allFinite() || !(H.diagonal().minCoeff() > 0.0)) return std::nullopt;
+  if (!hessian.allFinite() || !(hessian.diagonal().minCoeff() > 0.0)) return std::nullopt;
   ScaledHessian scaled;
-  scaled.scale = H.diagonal().cwiseSqrt().cwiseInverse();
-  scaled.factors.compute(scaled.scale.asDiagonal() * H * scaled.scale.asDiagonal());
+  scaled.scale = hessian.diagonal().cwiseSqrt().cwiseInverse();
+  scaled.factors.compute(scaled.scale.asDiagonal() * hessian * scaled.scale.asDiagonal());
   if (!(scaled.factors.vectorD().minCoeff() > kMinPivot)) return std::nullopt;
   return scaled;
 }

@@ -43,7 +43,7 @@ void AddScores(const PackedCorrespondences& c,
         (P[4] * x + P[5] * y + P[6] * z + P[7]) * inverse_depth - Lanes(c.v() + i);
     const FloatLanes ratio = (du * du + dv * dv) * inverse_squared_threshold;
     const FloatLanes soft_inlier = 1.0F / (1.0F + ratio * ratio);
-    sum += depth > kMinDepth_m ? soft_inlier : zero;
+    sum += depth > kMinDepth ? soft_inlier : zero;
   }
   for (std::size_t lane = 0; lane < kLanes; ++lane)
     score[lane] = sum[lane];
@@ -74,7 +74,7 @@ InlierCount CountInliers(const PackedCorrespondences& correspondences,
   double squares = 0.0;
   for (std::size_t i = 0; i < correspondences.size(); ++i) {
     const Eigen::Vector3d p_CP = X_CM * correspondences.p_MP(i);
-    if (p_CP.z() < kMinDepth_m) continue;
+    if (p_CP.z() < kMinDepth) continue;
     const Eigen::Vector2d projected =
         correspondences.focal().cwiseProduct(p_CP.head<2>()) / p_CP.z();
     const double square = (projected - correspondences.pixel(i)).squaredNorm();

@@ -8,7 +8,7 @@ namespace relocd {
 
 /// Nearer than this, in metres, a point does not count as seen: the reprojection error says nothing
 /// there.
-inline constexpr float kMinDepth_m = 0.1F;
+inline constexpr float kMinDepth = 0.1F;
 
 /// The sum of `1 / (1 + (e / threshold)^4)` over the first `count` correspondences (rounded up to a
 /// multiple of kLanes), where e is the reprojection error: about the number of inliers, without a

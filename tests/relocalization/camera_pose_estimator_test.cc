@@ -208,7 +208,7 @@ TEST(CameraPoseEstimatorTest, DoesNotCountPointsBehindTheCamera) {
 }
 
 TEST(CameraPoseEstimatorTest, TakesAPriorWhereSamplingFindsNothing) {
-  const Scene scene = MakeScene({.outlier_share = 0.9}, 8);
+  const Scene scene = MakeScene({.outlier_share = 0.8}, 8);
   CameraPoseOptions options;
   options.max_tries = 1;
   const auto estimate = [&](const std::optional<Pose3>& prior) {

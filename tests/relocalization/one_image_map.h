@@ -60,22 +60,22 @@ inline Head MakeLinearHead(const Eigen::MatrixXd& weights, const Eigen::VectorXd
     const int rows = head.shape.LayerInputs(layer);
     const int columns = head.shape.LayerOutputs(layer);
     using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    RowMajor W = RowMajor::Zero(rows, columns);
-    Eigen::VectorXf b = Eigen::VectorXf::Zero(columns);
+    RowMajor matrix = RowMajor::Zero(rows, columns);
+    Eigen::VectorXf offset = Eigen::VectorXf::Zero(columns);
     if (layer == 0) {
-      W.leftCols(inputs).setIdentity();
-      W.rightCols(inputs) = -RowMajor::Identity(inputs, inputs);
+      matrix.leftCols(inputs).setIdentity();
+      matrix.rightCols(inputs) = -RowMajor::Identity(inputs, inputs);
     } else if (layer + 1 < head.shape.layer_count()) {
-      W.setIdentity();
+      matrix.setIdentity();
     } else {
-      W.topRows(inputs) = weights.cast<float>();
-      W.bottomRows(inputs) = -weights.cast<float>();
-      b = bias.cast<float>();
+      matrix.topRows(inputs) = weights.cast<float>();
+      matrix.bottomRows(inputs) = -weights.cast<float>();
+      offset = bias.cast<float>();
     }
     head.layers.push_back({.inputs = rows,
                            .outputs = columns,
-                           .weights = {W.data(), W.data() + W.size()},
-                           .bias = {b.data(), b.data() + b.size()}});
+                           .weights = {matrix.data(), matrix.data() + matrix.size()},
+                           .bias = {offset.data(), offset.data() + offset.size()}});
   }
   return head;
 }
@@ -103,7 +103,7 @@ inline SceneMap MakeOneImageMap(const GrayImage& image,
   map.whitening.Apply(features.values, whitened);
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const auto cells = static_cast<Eigen::Index>(features.size());
-  const Eigen::MatrixXd F =
+  const Eigen::MatrixXd inputs =
       Eigen::Map<const RowMajor>(whitened.data(), cells, kDimensions).cast<double>();
 
   const PinholeCamera camera(intrinsics);
@@ -115,8 +115,10 @@ inline SceneMap MakeOneImageMap(const GrayImage& image,
     targets.row(cell).head<3>() = X_WC * Eigen::Vector3d(depth * ray.x(), depth * ray.y(), depth);
   }
   const Eigen::RowVectorXd centre = targets.colwise().mean();
-  const Eigen::MatrixXd gram = F * F.transpose() + 1e-9 * Eigen::MatrixXd::Identity(cells, cells);
-  const Eigen::MatrixXd weights = F.transpose() * gram.ldlt().solve(targets.rowwise() - centre);
+  const Eigen::MatrixXd gram =
+      inputs * inputs.transpose() + 1e-9 * Eigen::MatrixXd::Identity(cells, cells);
+  const Eigen::MatrixXd weights =
+      inputs.transpose() * gram.ldlt().solve(targets.rowwise() - centre);
 
   // The fourth output is the homogeneous coordinate, about one for zero.
   const float w = HomogeneousScale(0.0F);

@@ -13,7 +13,7 @@
 namespace relocd {
 namespace {
 
-constexpr double kThreshold_px = 6.0;
+constexpr double kThresholdPx = 6.0;
 
 CameraFromWorld InPackedFrame(const Pose3& X_WC, const PackedCorrespondences& packed) {
   const Eigen::Matrix3d R_CW = X_WC.R().transpose();
@@ -51,18 +51,18 @@ TEST(PoseRefinementTest, CovarianceIsTheInverseHessianOfThePinholeModel) {
       packed,
       packed.size(),
       InPackedFrame(scene.X_WC, packed),
-      {.steps = 12, .start_threshold_px = kThreshold_px, .end_threshold_px = kThreshold_px});
+      {.steps = 12, .start_threshold_px = kThresholdPx, .end_threshold_px = kThresholdPx});
   const PinholeCamera camera = PackedCamera(scene);
   Matrix6d hessian = Matrix6d::Zero();
   for (std::size_t i = 0; i < packed.size(); ++i) {
     const Eigen::Vector3d p_CP = refined.X_CM * packed.p_MP(i);
     const auto projection = camera.ProjectWithJacobian(p_CP);
-    if (!projection || p_CP.z() < kMinDepth_m) continue;
+    if (!projection || p_CP.z() < kMinDepth) continue;
     Eigen::Matrix<double, 3, 6> J_p;
     J_p << Eigen::Matrix3d::Identity(), -Skew(p_CP);
     const Eigen::Matrix<double, 2, 6> J = projection->J_p_CP * J_p;
     const double ratio =
-        (projection->pixel - packed.pixel(i)).squaredNorm() / (kThreshold_px * kThreshold_px);
+        (projection->pixel - packed.pixel(i)).squaredNorm() / (kThresholdPx * kThresholdPx);
     hessian += J.transpose() * J / ((1.0 + ratio) * (1.0 + ratio));
   }
   const Matrix6d product = refined.covariance * hessian;  // the residual variance times identity
@@ -92,13 +92,13 @@ TEST(SoftInlierScoreTest, IsTheSumOfItsFormula) {
   double expected = 0.0;
   for (std::size_t i = 0; i < packed.size(); ++i) {
     const Eigen::Vector3d p_CP = X_CM * packed.p_MP(i);
-    if (p_CP.z() < kMinDepth_m) continue;
+    if (p_CP.z() < kMinDepth) continue;
     const auto pixel = camera.Project(p_CP);
     if (!pixel) continue;
-    expected += 1.0 / (1.0 + std::pow((*pixel - packed.pixel(i)).norm() / kThreshold_px, 4.0));
+    expected += 1.0 / (1.0 + std::pow((*pixel - packed.pixel(i)).norm() / kThresholdPx, 4.0));
   }
-  EXPECT_NEAR(SoftInlierScore(packed, packed.size(), X_CM, kThreshold_px), expected, 1e-2);
-  EXPECT_NEAR(SoftInlierScore(packed, 1'000'000, X_CM, kThreshold_px), expected, 1e-2);
+  EXPECT_NEAR(SoftInlierScore(packed, packed.size(), X_CM, kThresholdPx), expected, 1e-2);
+  EXPECT_NEAR(SoftInlierScore(packed, 1'000'000, X_CM, kThresholdPx), expected, 1e-2);
 }
 
 TEST(PackedCorrespondencesTest, KeepsEachCorrespondenceInAnotherOrder) {

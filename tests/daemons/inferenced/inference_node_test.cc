@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 
 constexpr int kWidth = 320;
 constexpr int kHeight = 240;
-constexpr std::int64_t kImageTime_ns = 5'000'000'000;
+constexpr std::int64_t kImageTimeNs = 5'000'000'000;
 constexpr std::int64_t kRunId = 77;
 
 CameraIntrinsics SmallCamera() {
@@ -70,6 +70,19 @@ ImageLocalization GoodAnswer() {
   return answer;
 }
 
+image_t MakeImage(std::vector<std::uint8_t> jpeg, std::int64_t seq = 3) {
+  image_t image{};
+  image.utime = 1'600'000'000'000'000;
+  image.width = kWidth;
+  image.height = kHeight;
+  image.pixelformat = 0x47504A4D;
+  image.size = static_cast<std::int32_t>(jpeg.size());
+  image.data = std::move(jpeg);
+  SetImageMetadata({.mono_ns = kImageTimeNs, .seq = seq, .run_id = 9}, image);
+  image.nmetadata = static_cast<std::int32_t>(image.metadata.size());
+  return image;
+}
+
 class InferenceNodeTest : public testing::Test {
  protected:
   InferenceNodeTest() {
@@ -84,18 +97,6 @@ class InferenceNodeTest : public testing::Test {
         });
   }
 
-  static image_t MakeImage(std::vector<std::uint8_t> jpeg, std::int64_t seq = 3) {
-    image_t image{};
-    image.utime = 1'600'000'000'000'000;
-    image.width = kWidth;
-    image.height = kHeight;
-    image.pixelformat = 0x47504A4D;
-    image.size = static_cast<std::int32_t>(jpeg.size());
-    image.data = std::move(jpeg);
-    SetImageMetadata({.mono_ns = kImageTime_ns, .seq = seq, .run_id = 9}, image);
-    image.nmetadata = static_cast<std::int32_t>(image.metadata.size());
-    return image;
-  }
   static image_t GoodImage(std::int64_t seq = 3) {
     return MakeImage(MakeTestJpeg(kWidth, kHeight), seq);
   }
@@ -110,7 +111,7 @@ class InferenceNodeTest : public testing::Test {
   }
 
   /// 30 ms after the image was taken, and it stands still.
-  ClockReading now_{.monotonic = FromNanoseconds(kImageTime_ns + 30'000'000),
+  ClockReading now_{.monotonic = FromNanoseconds(kImageTimeNs + 30'000'000),
                     .realtime_us = 1'600'000'000'030'000};
   InProcessBus bus_;
   FakeLocalizer* localizer_ = nullptr;
@@ -123,7 +124,7 @@ TEST_F(InferenceNodeTest, SaysWhereTheCameraWas) {
   EXPECT_EQ(answer.status, camera_pose_t::STATUS_OK);
   EXPECT_EQ(answer.message, "");
   EXPECT_EQ(answer.utime, 1'600'000'000'000'000);
-  EXPECT_EQ(answer.mono_ns, kImageTime_ns);
+  EXPECT_EQ(answer.mono_ns, kImageTimeNs);
   EXPECT_EQ(answer.seq, 0);
   EXPECT_EQ(answer.run_id, kRunId);
   EXPECT_EQ(answer.camera, "front");
@@ -241,11 +242,24 @@ TEST_F(InferenceNodeTest, RefusesAnImageWithoutTime) {
 }
 
 TEST_F(InferenceNodeTest, PassesOverImagesThatAreTooOld) {
-  now_.monotonic = FromNanoseconds(kImageTime_ns) + std::chrono::milliseconds(501);
+  now_.monotonic = FromNanoseconds(kImageTimeNs) + std::chrono::milliseconds(501);
   node_->Handle("front", GoodImage());
   EXPECT_EQ(bus_.HandlePending(), 0);
   EXPECT_EQ(node_->counters().too_old, 1);
   EXPECT_THAT(localizer_->seeds, testing::IsEmpty());
+}
+
+TEST(InferenceNodeAgeTest, TakesImagesOfAnyAgeWithoutALimit) {
+  InProcessBus bus;
+  InferenceConfig config;
+  config.max_image_age_ms = 0;
+  InferenceNode node(config, std::make_unique<FakeLocalizer>(), bus, kRunId, [] {
+    return ClockReading{.monotonic = FromNanoseconds(kImageTimeNs) + std::chrono::hours(24 * 365),
+                        .realtime_us = 0};
+  });
+  node.Handle("front", MakeImage(MakeTestJpeg(kWidth, kHeight)));
+  EXPECT_EQ(node.counters().too_old, 0);
+  EXPECT_EQ(bus.HandlePending(), 1);
 }
 
 TEST_F(InferenceNodeTest, WarnsWhileThereAreNoImages) {
@@ -297,7 +311,7 @@ std::vector<std::uint8_t> BytesOfAnAnswer() {
       MapLocalizer::Create(MakeOneImageMap(decoded, SmallCamera(), kPose), {}, 1).value(),
       bus,
       kRunId,
-      [] { return ClockReading{.monotonic = FromNanoseconds(kImageTime_ns), .realtime_us = 0}; });
+      [] { return ClockReading{.monotonic = FromNanoseconds(kImageTimeNs), .realtime_us = 0}; });
   std::vector<std::uint8_t> answer;
   bus.SubscribeRaw("CAMERA_POSE", [&](const std::string&, std::span<const std::uint8_t> bytes) {
     answer.assign(bytes.begin(), bytes.end());
@@ -312,7 +326,7 @@ std::vector<std::uint8_t> BytesOfAnAnswer() {
   message.data = jpeg;
   message.width = kWidth;
   message.height = kHeight;
-  SetImageMetadata({.mono_ns = kImageTime_ns, .seq = 12, .run_id = 9}, message);
+  SetImageMetadata({.mono_ns = kImageTimeNs, .seq = 12, .run_id = 9}, message);
   EXPECT_TRUE(bus.Publish(ImageChannel("front"), message));
   bus.HandlePending();
   return answer;
