@@ -45,24 +45,27 @@ bool WalkFields(WireWalker& walker, const status_t* type);
 bool WalkFields(WireWalker& walker, const supervisor_t* type);
 bool WalkFields(WireWalker& walker, const text_t* type);
 
+/// Whether `bytes` have the shape of a Message: its fields within the limits, and nothing behind
+/// them.
+template <typename Message>
+bool HasShapeOf(std::span<const std::uint8_t> bytes) {
+  if constexpr (requires(WireWalker & walker, const Message* type) { WalkFields(walker, type); }) {
+    constexpr std::size_t kFingerprintSize = 8;
+    WireWalker walker(bytes);
+    const Message* const type = nullptr;
+    return walker.Skip(kFingerprintSize) && WalkFields(walker, type) && walker.AtEnd();
+  } else {
+    return static_cast<int>(bytes.size()) == Message().getEncodedSize();
+  }
+}
+
 /// The message that the whole of `bytes` encodes, or nothing. Never throws, and allocates no more
 /// than the limits allow.
 template <typename Message>
 std::optional<Message> DecodeBounded(std::span<const std::uint8_t> bytes) noexcept {
-  constexpr std::size_t kFingerprintSize = 8;
   try {
+    if (!HasShapeOf<Message>(bytes)) return std::nullopt;
     const int size = static_cast<int>(bytes.size());
-    if constexpr (requires(WireWalker & walker, const Message* type) {
-                    WalkFields(walker, type);
-                  }) {
-      WireWalker walker(bytes);
-      if (!walker.Skip(kFingerprintSize) ||
-          !WalkFields(walker, static_cast<const Message*>(nullptr)) || !walker.AtEnd()) {
-        return std::nullopt;
-      }
-    } else if (size != Message().getEncodedSize()) {
-      return std::nullopt;
-    }
     std::optional<Message> message(std::in_place);
     if (message->decode(bytes.data(), 0, size) != size) return std::nullopt;
     return message;

@@ -84,6 +84,22 @@ struct Linearised {
   l.v[5] = fy * x;
 }
 
+/// The upper triangle of the weighted normal equations, row by row, and their right side.
+[[gnu::always_inline]] inline void AddNormalEquations(const Linearised& l, FloatLanes* terms) {
+  const FloatLanes weu = l.w * l.eu;
+  const FloatLanes wev = l.w * l.ev;
+  std::size_t term = 0;
+  for (std::size_t row = 0; row < 6; ++row) {
+    const FloatLanes wu = l.w * l.u[row];
+    const FloatLanes wv = l.w * l.v[row];
+    for (std::size_t column = row; column < 6; ++column)
+      terms[term++] += wu * l.u[column] + wv * l.v[column];
+    terms[kGradient + row] += l.u[row] * weu + l.v[row] * wev;
+  }
+  terms[kWeight] += l.w;
+  terms[kSquaredInfluence] += weu * weu + wev * wev;
+}
+
 RELOCD_CLONE_FOR_AVX2
 void AddBlock(const PackedCorrespondences& c,
               std::size_t begin,
@@ -92,21 +108,9 @@ void AddBlock(const PackedCorrespondences& c,
               Sums& sums) {
   FloatLanes terms[kTerms] = {};
   for (std::size_t i = begin; i < end; i += kLanes) {
-    Linearised l;
+    Linearised l{};
     Linearise(c, i, view, l);
-    const FloatLanes weu = l.w * l.eu;
-    const FloatLanes wev = l.w * l.ev;
-    std::size_t term = 0;
-    for (std::size_t row = 0; row < 6; ++row) {
-      const FloatLanes wu = l.w * l.u[row];
-      const FloatLanes wv = l.w * l.v[row];
-      for (std::size_t column = row; column < 6; ++column) {
-        terms[term++] += wu * l.u[column] + wv * l.v[column];
-      }
-      terms[kGradient + row] += l.u[row] * weu + l.v[row] * wev;
-    }
-    terms[kWeight] += l.w;
-    terms[kSquaredInfluence] += weu * weu + wev * wev;
+    AddNormalEquations(l, terms);
     // Half the divergence of w e: (1 - ratio) / (1 + ratio)^3.
     terms[kInfluenceSlope] += l.w * l.fade * (1.0F - l.ratio);
   }

@@ -87,6 +87,7 @@ template <typename Number>
 }
 
 // Function multi-versioning does not go with templates, hence one of each for both types.
+// NOLINTBEGIN(bugprone-macro-parentheses): the argument is a type, which takes no parentheses.
 #define RELOCD_DEFINE_ROW_LOOPS(Number)                                                         \
   RELOCD_VECTORISED void MultiplyRows(const Number* hidden,                                     \
                                       std::size_t rows,                                         \
@@ -134,6 +135,7 @@ template <typename Number>
 RELOCD_DEFINE_ROW_LOOPS(float)
 RELOCD_DEFINE_ROW_LOOPS(Bfloat16)
 #undef RELOCD_DEFINE_ROW_LOOPS
+// NOLINTEND(bugprone-macro-parentheses)
 
 }  // namespace
 
@@ -334,8 +336,9 @@ void ShardNetwork<Number>::Run(OutputLoss& loss, std::span<float> gradient) {
                 kHeadOutputs,
                 padded.begin() + static_cast<std::ptrdiff_t>(row * kHeadOutputs));
   }
-  loss.Evaluate(std::span(outputs_).first(rows_ * kHeadOutputs),
-                std::span(output_gradients_).first(rows_ * kHeadOutputs));
+  const std::span<const float> points = outputs_;
+  const std::span<float> gradients = output_gradients_;
+  loss.Evaluate(points.first(rows_ * kHeadOutputs), gradients.first(rows_ * kHeadOutputs));
   for (std::size_t row = rows_; row-- > 0;) {
     float* lanes = output_gradients_.data() + row * kLanes;
     std::copy_backward(
