@@ -13,6 +13,8 @@ target_link_options(relocd_build_flags INTERFACE -Wl,--as-needed)  # camerad and
 if(RELOCD_SANITIZERS)
   target_compile_options(relocd_build_flags INTERFACE -fsanitize=${RELOCD_SANITIZERS} -fno-omit-frame-pointer)
   target_link_options(relocd_build_flags INTERFACE -fsanitize=${RELOCD_SANITIZERS})
+  # Under the address sanitizer Eigen allocates in another way than in Debian's Ceres, which then frees what it must not.
+  target_compile_definitions(relocd_build_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 # relocd_add_library(<module> SOURCES ... [DEPENDS ...] [PRIVATE_DEPENDS ...])

@@ -16,6 +16,7 @@
 #include "smoothing/offline_smoother.h"
 #include "smoothing/simulated_drive.h"
 #include "support/error_statistics.h"
+#include "support/slow_build.h"
 
 namespace relocd {
 namespace {
@@ -23,7 +24,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr unsigned kSeeds = 6;
+constexpr unsigned kSeeds = kIsSlowBuild ? 1 : 6;
 
 double PositionError(const Pose2& X_WB, const Pose2& truth) {
   return (X_WB.translation() - truth.translation()).norm();
@@ -79,6 +80,7 @@ Honesty MeasureHonesty(bool has_heading) {
 }
 
 TEST(FixedLagSmootherTest, ReportsACovarianceThatTheTruthLiesIn) {
+  if (kIsSlowBuild) GTEST_SKIP() << "3,200 solutions take minutes under a sanitizer";
   for (const bool has_heading : {true, false}) {
     const Honesty honesty = MeasureHonesty(has_heading);
     std::cout << (has_heading ? "poses" : "positions") << ": truth in the 95 % ellipse "
@@ -254,7 +256,7 @@ int FixesUntilFound(bool has_heading, unsigned seed) {
 }
 
 TEST(FixedLagSmootherTest, FindsACarriedBodyAgain) {
-  for (unsigned seed = 0; seed < 5; ++seed) {
+  for (unsigned seed = 0; seed < (kIsSlowBuild ? 1U : 5U); ++seed) {
     for (const bool has_heading : {true, false}) {
       const int fixes = FixesUntilFound(has_heading, seed);
       EXPECT_GE(fixes, 0) << seed;
@@ -356,7 +358,7 @@ TEST(FixedLagSmootherTest, AResetIsAboutThisMoment) {
 TEST(SmoothAllTest, BeatsTheCausalEstimate) {
   std::vector<double> causal;
   std::vector<double> smoothed;
-  for (unsigned seed = 0; seed < 5; ++seed) {
+  for (unsigned seed = 0; seed < (kIsSlowBuild ? 1U : 5U); ++seed) {
     const auto drive = DriveSimulator({.outlier_share = 0.2}, seed).Run();
     const auto before = SmoothCausally(drive.log, SmootherConfig());
     const auto after = SmoothAll(drive.log, SmootherConfig());

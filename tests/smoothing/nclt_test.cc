@@ -11,6 +11,7 @@
 #include "geometry/covariance.h"
 #include "smoothing/offline_smoother.h"
 #include "support/error_statistics.h"
+#include "support/slow_build.h"
 
 namespace relocd {
 namespace {
@@ -87,6 +88,7 @@ class NcltTest : public ::testing::Test {
     if (!std::filesystem::exists(kFolder + "frames.csv")) {
       GTEST_SKIP() << "no " << kFolder << "frames.csv";
     }
+    if (kIsSlowBuild) GTEST_SKIP() << "900 solutions take minutes under a sanitizer";
     run_ = ReadRun(config_);
     ASSERT_EQ(run_.truth.size(), 900U);
   }
