@@ -84,8 +84,7 @@ RefinedPose RefineOnAll(const PackedCorrespondences& correspondences,
   RefinementSchedule schedule{.steps = options.refinement_steps,
                               .start_threshold_px = threshold_px,
                               .end_threshold_px = 0.5 * threshold_px};
-  const RefinedPose refined =
-      RefinePose(correspondences, correspondences.size(), best.X_CM, schedule);
+  RefinedPose refined = RefinePose(correspondences, correspondences.size(), best.X_CM, schedule);
   const double score =
       SoftInlierScore(correspondences, correspondences.size(), refined.X_CM, threshold_px);
   if (score > kNearlyEqual * best.score) return refined;

@@ -9,14 +9,15 @@ namespace {
 /// The rows of the 3x4 matrix that maps (p_MP, 1) to (fx X, fy Y, Z).
 std::array<float, 12> ProjectionMatrix(const CameraFromWorld& X_CM, const Eigen::Vector2d& focal) {
   const Eigen::Vector3d scale(focal.x(), focal.y(), 1.0);
-  std::array<float, 12> P{};
+  std::array<float, 12> projection{};
   for (Eigen::Index row = 0; row < 3; ++row) {
     for (Eigen::Index column = 0; column < 4; ++column) {
       const double value = column < 3 ? X_CM.R_CW(row, column) : X_CM.p_CW[row];
-      P[static_cast<std::size_t>(4 * row + column)] = static_cast<float>(scale[row] * value);
+      projection[static_cast<std::size_t>(4 * row + column)] =
+          static_cast<float>(scale[row] * value);
     }
   }
-  return P;
+  return projection;
 }
 
 const FloatLanes& Lanes(const float* data) {
@@ -26,7 +27,7 @@ const FloatLanes& Lanes(const float* data) {
 RELOCD_CLONE_FOR_AVX2
 void AddScores(const PackedCorrespondences& c,
                std::size_t count,
-               const std::array<float, 12>& P,
+               const std::array<float, 12>& projection,
                float inverse_squared_threshold,
                std::array<float, kLanes>& score) {
   FloatLanes sum{};
@@ -35,12 +36,17 @@ void AddScores(const PackedCorrespondences& c,
     const FloatLanes x = Lanes(c.x() + i);
     const FloatLanes y = Lanes(c.y() + i);
     const FloatLanes z = Lanes(c.z() + i);
-    const FloatLanes depth = P[8] * x + P[9] * y + P[10] * z + P[11];
+    const FloatLanes depth =
+        projection[8] * x + projection[9] * y + projection[10] * z + projection[11];
     const FloatLanes inverse_depth = 1.0F / depth;
     const FloatLanes du =
-        (P[0] * x + P[1] * y + P[2] * z + P[3]) * inverse_depth - Lanes(c.u() + i);
+        (projection[0] * x + projection[1] * y + projection[2] * z + projection[3]) *
+            inverse_depth -
+        Lanes(c.u() + i);
     const FloatLanes dv =
-        (P[4] * x + P[5] * y + P[6] * z + P[7]) * inverse_depth - Lanes(c.v() + i);
+        (projection[4] * x + projection[5] * y + projection[6] * z + projection[7]) *
+            inverse_depth -
+        Lanes(c.v() + i);
     const FloatLanes ratio = (du * du + dv * dv) * inverse_squared_threshold;
     const FloatLanes soft_inlier = 1.0F / (1.0F + ratio * ratio);
     sum += depth > kMinDepth ? soft_inlier : zero;
