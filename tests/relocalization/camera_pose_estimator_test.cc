@@ -40,7 +40,7 @@ class OutlierShareTest : public testing::TestWithParam<int> {};
 
 TEST_P(OutlierShareTest, FindsThePoseAndTellsInliersFromOutliers) {
   const double share = GetParam() / 100.0;
-  for (unsigned seed = 0; seed < 20; ++seed) {
+  for (unsigned seed = 0; seed < 12; ++seed) {
     const Scene scene = MakeScene({.outlier_share = share}, seed);
     const CameraPoseResult result = Estimate(scene);
     ASSERT_EQ(result.status, CameraPoseStatus::kOk) << "seed " << seed;
@@ -71,12 +71,15 @@ class CovarianceTest : public testing::TestWithParam<int> {};
 
 TEST_P(CovarianceTest, IsThatOfTheErrorOverManyScenes) {
   constexpr int kScenes = 200;
+  CameraPoseOptions options;
+  options.hypotheses = 16;  // enough here, and four times as fast
   double nees = 0.0;
   int within_95 = 0;
   for (unsigned seed = 0; seed < kScenes; ++seed) {
     const Scene scene = MakeScene(
         {.correspondences = 600, .outlier_share = 0.4, .pixel_sigma_px = GetParam() / 10.0}, seed);
-    const CameraPoseResult result = Estimate(scene);
+    const CameraPoseResult result =
+        EstimateCameraPose(scene.correspondences, scene.camera(), options, std::nullopt, 1);
     ASSERT_EQ(result.status, CameraPoseStatus::kOk);
     ASSERT_TRUE(IsCovariance(result.covariance));
     const double squared = SquaredMahalanobis(ErrorOf(result, scene), result.covariance);
