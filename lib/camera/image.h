@@ -20,4 +20,11 @@ struct GrayImage {
   }
 };
 
+/// An 8-bit sRGB image, owned: row-major, H x W x 3, without padding between the rows.
+struct RgbImage {
+  int width = 0;   ///< px
+  int height = 0;  ///< px
+  std::vector<std::uint8_t> pixels;
+};
+
 }  // namespace relocd
