@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "relocalization/counter_random.h"
+#include "core/counter_random.h"
 
 namespace relocd {
 namespace {

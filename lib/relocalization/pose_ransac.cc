@@ -4,7 +4,7 @@
 #include <array>
 #include <optional>
 
-#include "relocalization/counter_random.h"
+#include "core/counter_random.h"
 #include "relocalization/p3p.h"
 #include "relocalization/soft_inlier_score.h"
 

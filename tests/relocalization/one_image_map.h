@@ -13,9 +13,9 @@
 
 #include "camera/image.h"
 #include "camera/pinhole_camera.h"
+#include "core/counter_random.h"
 #include "features/gradient_histograms.h"
 #include "geometry/pose3.h"
-#include "relocalization/counter_random.h"
 #include "scene_coordinates/head.h"
 #include "scene_coordinates/map_file.h"
 

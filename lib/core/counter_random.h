@@ -15,6 +15,13 @@ class CounterRandom {
     return Mix(seed_ + (counter + 1) * 0x9E3779B97F4A7C15u);
   }
 
+  /// Evenly spread over [0, 1).
+  [[nodiscard]] float Unit(std::uint64_t counter) const {
+    constexpr int kMantissaBits = 24;
+    constexpr float kUlp = 1.0F / static_cast<float>(1U << kMantissaBits);
+    return static_cast<float>(Bits(counter) >> (64 - kMantissaBits)) * kUlp;
+  }
+
   /// A number in [0, bound) from 32 random bits. Its bias, bound / 2^32, is nothing for bounds of
   /// some thousands.
   static std::uint32_t Below(std::uint32_t bound, std::uint32_t bits) {
