@@ -2,8 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/result.h"
@@ -65,5 +67,11 @@ std::string FormatTable(const Evaluation& evaluation,
 std::string FormatJson(const Evaluation& evaluation,
                        const EvaluatedTrajectory& truth,
                        const EvaluatedTrajectory& estimate);
+
+/// The parts of that line, which other reports say in the same words.
+std::string JsonString(std::string_view text);
+std::string JsonSummary(const ErrorSummary& summary);
+std::string JsonCoverage(const Evaluation& evaluation);
+std::string JsonCounts(const std::map<std::string, std::size_t>& counts);
 
 }  // namespace relocd

@@ -3,26 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
-#include <limits>
-#include <system_error>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "geometry/covariance.h"
 #include "geometry/planar.h"
+#include "plot_canvas.h"
 
 namespace relocd {
 namespace {
 
-// Drawn at twice the size and then halved, which smooths lines and letters. Lengths are in pixels
-// of the finished image.
-constexpr double kDrawScale = 2.0;
+// Lengths are in pixels of the finished image.
 constexpr double kWidth = 1440.0;
 constexpr double kMapWidth = 1130.0;
 constexpr double kMinMapHeight = 320.0;
@@ -32,13 +25,9 @@ constexpr double kLeft = 95.0;
 constexpr double kTop = 75.0;
 constexpr double kBetween = 85.0;
 constexpr double kBottom = 65.0;
-constexpr double kFontHeight = 13.0;
 
 constexpr double kSmallestErrorM = 0.01;  // the scale of a plot without errors
 
-const cv::Scalar kWhite(255, 255, 255);
-const cv::Scalar kInk(60, 50, 45);
-const cv::Scalar kGrid(232, 228, 226);
 const cv::Scalar kTruthColour(150, 140, 135);
 const cv::Scalar kEllipseColour(220, 170, 90);
 const cv::Scalar kErrorColour(160, 90, 30);
@@ -57,193 +46,6 @@ cv::Scalar ErrorColour(double share) {
     colour[channel] = (1.0 - blend) * kStops.at(low).at(c) + blend * kStops.at(low + 1).at(c);
   }
   return colour;
-}
-
-struct Range {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-
-  void Include(double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
-  [[nodiscard]] double size() const { return high - low; }
-  [[nodiscard]] bool Contains(double value) const { return value >= low && value <= high; }
-  void Grow(double margin) {
-    low -= margin;
-    high += margin;
-  }
-};
-
-/// The round step (1, 2 or 5 times a power of ten) that divides `size` into about `count` parts.
-double NiceStep(double size, double count) {
-  const double raw = size / count;
-  const double power = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (raw <= factor * power) return factor * power;
-  }
-  return 10.0 * power;
-}
-
-cv::Size TextSize(const std::string& text, double height) {
-  constexpr double kHersheyHeight = 22.0;
-  return cv::getTextSize(
-      text, cv::FONT_HERSHEY_SIMPLEX, height * kDrawScale / kHersheyHeight, 1, nullptr);
-}
-
-/// Where a text's given point is anchored: 0 its left or top, 0.5 its middle, 1 its right or
-/// bottom.
-struct Anchor {
-  double x = 0.0;
-  double y = 1.0;
-};
-
-/// An image that is drawn at twice its size.
-class Canvas {
- public:
-  Canvas(double width, double height)
-      : image_(static_cast<int>(height * kDrawScale),
-               static_cast<int>(width * kDrawScale),
-               CV_8UC3,
-               kWhite) {}
-
-  void Line(cv::Point2d from, cv::Point2d to, const cv::Scalar& colour, double width) {
-    cv::line(image_, Fixed(from), Fixed(to), colour, Thickness(width), cv::LINE_AA, kShift);
-  }
-  void Dot(cv::Point2d centre, double radius, const cv::Scalar& colour) {
-    cv::circle(image_, Fixed(centre), FixedLength(radius), colour, cv::FILLED, cv::LINE_AA, kShift);
-  }
-  void Polygon(const std::vector<cv::Point2d>& corners, const cv::Scalar& colour) {
-    std::vector<cv::Point> fixed;
-    fixed.reserve(corners.size());
-    for (const cv::Point2d& corner : corners)
-      fixed.push_back(Fixed(corner));
-    cv::fillPoly(image_, std::vector{fixed}, colour, cv::LINE_AA, kShift);
-  }
-  void Polyline(const std::vector<cv::Point2d>& corners, const cv::Scalar& colour, double width) {
-    for (std::size_t i = 1; i < corners.size(); ++i)
-      Line(corners[i - 1], corners[i], colour, width);
-  }
-  void Rectangle(cv::Rect2d box, const cv::Scalar& colour) {
-    cv::rectangle(
-        image_, Fixed(box.tl()), Fixed(box.br()), colour, cv::FILLED, cv::LINE_AA, kShift);
-  }
-  void Text(const std::string& text, cv::Point2d at, Anchor anchor, double height = kFontHeight) {
-    constexpr double kHersheyHeight = 22.0;
-    const cv::Size size = TextSize(text, height);
-    const cv::Point origin(
-        static_cast<int>(std::lround(at.x * kDrawScale - anchor.x * size.width)),
-        static_cast<int>(std::lround(at.y * kDrawScale + (1.0 - anchor.y) * size.height)));
-    cv::putText(image_,
-                text,
-                origin,
-                cv::FONT_HERSHEY_SIMPLEX,
-                height * kDrawScale / kHersheyHeight,
-                kInk,
-                Thickness(1.0),
-                cv::LINE_AA);
-  }
-  /// Blends what `draw` draws with what is there.
-  template <typename Draw>
-  void Translucent(double opacity, const Draw& draw) {
-    const cv::Mat before = image_.clone();
-    draw();
-    cv::addWeighted(image_, opacity, before, 1.0 - opacity, 0.0, image_);
-  }
-  [[nodiscard]] cv::Mat Finish() const {
-    cv::Mat finished;
-    cv::resize(image_, finished, {}, 1.0 / kDrawScale, 1.0 / kDrawScale, cv::INTER_AREA);
-    return finished;
-  }
-
- private:
-  static constexpr int kShift = 4;  // bits behind the point in cv's coordinates
-
-  static int FixedLength(double pixels) {
-    return static_cast<int>(std::lround(pixels * kDrawScale * (1 << kShift)));
-  }
-  static cv::Point Fixed(cv::Point2d point) { return {FixedLength(point.x), FixedLength(point.y)}; }
-  static int Thickness(double width) {
-    return std::max(1, static_cast<int>(std::lround(width * kDrawScale)));
-  }
-
-  cv::Mat image_;
-};
-
-/// A rectangle of the canvas with axes of its own.
-struct Panel {
-  cv::Rect2d box;
-  Range x;
-  Range y;
-
-  [[nodiscard]] cv::Point2d Pixel(const Eigen::Vector2d& point) const {
-    return {box.x + box.width * (point.x() - x.low) / x.size(),
-            box.y + box.height * (y.high - point.y()) / y.size()};
-  }
-  [[nodiscard]] bool Contains(const Eigen::Vector2d& point) const {
-    return x.Contains(point.x()) && y.Contains(point.y());
-  }
-};
-
-/// Without the dust of adding steps: 0 and not 1e-17.
-std::string TickLabel(double value, double step) {
-  const int decimals = std::max(0, static_cast<int>(std::ceil(-std::log10(step) - 1e-9)));
-  const double rounded = std::round(value / step) * step;
-  return fmt::format("{:.{}f}", rounded == 0.0 ? 0.0 : rounded, decimals);
-}
-
-/// The multiples of `step` within a range, at most a hundred.
-std::vector<double> Multiples(double step, const Range& range) {
-  constexpr int kMost = 100;
-  const double first = std::ceil(range.low / step);
-  std::vector<double> multiples;
-  for (int i = 0; i < kMost && (first + i) * step <= range.high; ++i)
-    multiples.push_back((first + i) * step);
-  return multiples;
-}
-
-void DrawAxes(Canvas& canvas,
-              const Panel& panel,
-              const std::string& x_label,
-              const std::string& y_label) {
-  constexpr double kTickDistance = 90.0;
-  constexpr double kRowDistance = 60.0;
-  constexpr double kGap = 8.0;
-  const cv::Rect2d& box = panel.box;
-  const double x_step = NiceStep(panel.x.size(), box.width / kTickDistance);
-  for (const double x : Multiples(x_step, panel.x)) {
-    const double u = panel.Pixel({x, panel.y.low}).x;
-    canvas.Line({u, box.y}, {u, box.br().y}, kGrid, 1.0);
-    canvas.Text(TickLabel(x, x_step), {u, box.br().y + kGap}, {0.5, 0.0});
-  }
-  const double y_step = NiceStep(panel.y.size(), std::max(3.0, box.height / kRowDistance));
-  for (const double y : Multiples(y_step, panel.y)) {
-    const double v = panel.Pixel({panel.x.low, y}).y;
-    canvas.Line({box.x, v}, {box.br().x, v}, kGrid, 1.0);
-    canvas.Text(TickLabel(y, y_step), {box.x - kGap, v}, {1.0, 0.5});
-  }
-  const std::vector<cv::Point2d> frame{
-      box.tl(), {box.br().x, box.y}, box.br(), {box.x, box.br().y}, box.tl()};
-  canvas.Polyline(frame, kInk, 0.7);
-  canvas.Text(
-      x_label, {box.x + 0.5 * box.width, box.br().y + 2.0 * kGap + kFontHeight}, {0.5, 0.0});
-  canvas.Text(y_label, {box.x, box.y - kGap}, {0.0, 1.0});
-}
-
-/// A length to compare with, in the lower left corner.
-void DrawScale(Canvas& canvas, const Panel& panel) {
-  constexpr double kPart = 8.0;  // of the panel's width
-  constexpr double kInset = 22.0;
-  constexpr double kEnd = 5.0;
-  const double length = NiceStep(panel.x.size(), kPart);
-  const double pixels = panel.box.width * length / panel.x.size();
-  const cv::Point2d left(panel.box.x + kInset, panel.box.br().y - kInset);
-  const cv::Point2d right(left.x + pixels, left.y);
-  canvas.Line(left, right, kInk, 1.2);
-  canvas.Line({left.x, left.y - kEnd}, {left.x, left.y + kEnd}, kInk, 1.2);
-  canvas.Line({right.x, right.y - kEnd}, {right.x, right.y + kEnd}, kInk, 1.2);
-  canvas.Text(
-      fmt::format("{:g} m", length), {0.5 * (left.x + right.x), left.y - kEnd - 2.0}, {0.5, 1.0});
 }
 
 /// The two axes of W that are drawn: to the right and up.
@@ -317,23 +119,6 @@ Panel MakeMapPanel(const std::vector<Eigen::Vector2d>& truth,
   return {.box = {kLeft, kTop, kMapWidth, height}, .x = x, .y = y};
 }
 
-std::vector<cv::Point2d> EllipsePixels(const Panel& panel,
-                                       const Pose2& X_WB,
-                                       const Eigen::Matrix2d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance);
-  const Eigen::Matrix2d root = axes.eigenvectors() *
-                               axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-                               std::sqrt(kChiSquared95Dof2);
-  constexpr int kCorners = 48;
-  std::vector<cv::Point2d> corners;
-  for (int i = 0; i <= kCorners; ++i) {
-    const double angle = 2.0 * std::numbers::pi * i / kCorners;
-    const Eigen::Vector2d point = root * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-    corners.push_back(panel.Pixel(X_WB * point));
-  }
-  return corners;
-}
-
 /// About sixty of them, so that they can be told apart. @return whether there are any.
 bool DrawEllipses(Canvas& canvas, const Panel& panel, const Evaluation& evaluation) {
   constexpr std::size_t kMost = 60;
@@ -390,8 +175,8 @@ void DrawTruth(Canvas& canvas, const Panel& panel, const std::vector<Eigen::Vect
   canvas.Polyline(pixels, kTruthColour, 2.5);
   if (pixels.empty()) return;
   constexpr double kRing = 7.0;
-  canvas.Dot(pixels.front(), kRing, kInk);
-  canvas.Dot(pixels.front(), kRing - 2.0, kWhite);
+  canvas.Dot(pixels.front(), kRing, canvas.theme().ink);
+  canvas.Dot(pixels.front(), kRing - 2.0, canvas.theme().background);
   canvas.Text("start", pixels.front() + cv::Point2d(kRing + 4.0, -kRing), {0.0, 1.0});
 }
 
@@ -519,12 +304,7 @@ Result<void> WritePlot(const Evaluation& evaluation,
   canvas.Text(title, {kLeft, 18.0}, {0.0, 0.5}, kTitleHeight);
   canvas.Text(numbers, {kLeft + kMapWidth, 50.0}, {1.0, 0.5});
 
-  try {
-    if (cv::imwrite(path, canvas.Finish())) return {};
-  } catch (const cv::Exception& exception) {
-    return Error{ErrorKind::kUnavailable, fmt::format("writing {}: {}", path, exception.err)};
-  }
-  return Error{ErrorKind::kUnavailable, fmt::format("writing {}: failed", path)};
+  return WritePng(canvas.Finish(), path);
 }
 
 }  // namespace relocd

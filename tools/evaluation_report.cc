@@ -1,4 +1,7 @@
+#include <cstddef>
 #include <iterator>
+#include <map>
+#include <string>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -59,6 +62,24 @@ std::string DescribeMissing(const EvaluatedTrajectory& trajectory) {
   return text.empty() ? text : " (without a pose: " + text + ")";
 }
 
+std::string JsonRelative(const std::vector<RelativeSummary>& relative) {
+  std::string text;
+  for (const RelativeSummary& summary : relative) {
+    fmt::format_to(
+        std::back_inserter(text),
+        R"({}{{"over":{},"translation_unit":{},"rotation_unit":{},"translation":{},"rotation":{}}})",
+        text.empty() ? "" : ",",
+        JsonString(summary.over),
+        JsonString(summary.translation_unit),
+        JsonString(summary.rotation_unit),
+        JsonSummary(summary.translation),
+        JsonSummary(summary.rotation));
+  }
+  return "[" + text + "]";
+}
+
+}  // namespace
+
 std::string JsonString(std::string_view text) {
   std::string json = "\"";
   for (const char c : text) {
@@ -79,22 +100,6 @@ std::string JsonSummary(const ErrorSummary& summary) {
                      summary.max);
 }
 
-std::string JsonRelative(const std::vector<RelativeSummary>& relative) {
-  std::string text;
-  for (const RelativeSummary& summary : relative) {
-    fmt::format_to(
-        std::back_inserter(text),
-        R"({}{{"over":{},"translation_unit":{},"rotation_unit":{},"translation":{},"rotation":{}}})",
-        text.empty() ? "" : ",",
-        JsonString(summary.over),
-        JsonString(summary.translation_unit),
-        JsonString(summary.rotation_unit),
-        JsonSummary(summary.translation),
-        JsonSummary(summary.rotation));
-  }
-  return "[" + text + "]";
-}
-
 std::string JsonCoverage(const Evaluation& evaluation) {
   const Coverage& coverage = evaluation.coverage;
   return fmt::format(
@@ -109,16 +114,14 @@ std::string JsonCoverage(const Evaluation& evaluation) {
       evaluation.median_sigma_m);
 }
 
-std::string JsonMissing(const EvaluatedTrajectory& trajectory) {
+std::string JsonCounts(const std::map<std::string, std::size_t>& counts) {
   std::string text;
-  for (const auto& [status, count] : trajectory.rows_without_pose) {
+  for (const auto& [name, count] : counts) {
     fmt::format_to(
-        std::back_inserter(text), "{}{}:{}", text.empty() ? "" : ",", JsonString(status), count);
+        std::back_inserter(text), "{}{}:{}", text.empty() ? "" : ",", JsonString(name), count);
   }
   return "{" + text + "}";
 }
-
-}  // namespace
 
 std::string FormatTable(const Evaluation& evaluation,
                         const EvaluatedTrajectory& truth,
@@ -190,7 +193,7 @@ std::string FormatJson(const Evaluation& evaluation,
       JsonString(estimate.path),
       evaluation.planar,
       estimate.rows,
-      JsonMissing(estimate),
+      JsonCounts(estimate.rows_without_pose),
       evaluation.pairs.size(),
       evaluation.outside,
       evaluation.in_gaps,

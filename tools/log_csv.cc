@@ -1,13 +1,17 @@
 #include "log_csv.h"
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <iterator>
-#include <utility>
+#include <string_view>
 
 #include <Eigen/Core>
 #include <fmt/format.h>
 
 #include "geometry/planar.h"
 #include "messaging/message_bus.h"
+#include "status_report.h"
 
 namespace relocd {
 namespace {
@@ -15,10 +19,13 @@ namespace {
 using RowMajorMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMajorMatrix6d = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
 
-void AppendPose(std::int64_t time_ns, const PlanarPose& pose, int status, std::string& text) {
+void AppendPose(std::int64_t time_ns,
+                const PlanarPose& pose,
+                std::string_view status,
+                std::string& text) {
   const Eigen::Matrix3d& c = pose.covariance;
   fmt::format_to(std::back_inserter(text),
-                 "{},{},{},{},{},{},{},{},{},{},{}\n",
+                 "{},{},{},{},{},{},{},{},{},{},{}",
                  time_ns,
                  pose.X_WB.x(),
                  pose.X_WB.y(),
@@ -32,15 +39,45 @@ void AppendPose(std::int64_t time_ns, const PlanarPose& pose, int status, std::s
                  status);
 }
 
+/// The row of a message without a pose: only its time and the reason.
+void AppendNoPose(std::int64_t time_ns, std::string_view status, std::string& text) {
+  fmt::format_to(std::back_inserter(text), "{},,,,,,,,,,{}", time_ns, status);
+}
+
+/// As `reloc smooth` writes it.
+std::string NameOfStatus(const localization_t& message) {
+  std::string name = NameOfLocalizationStatus(message.status);
+  std::ranges::transform(name, name.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return name;
+}
+
+/// As `reloc map localize` writes it.
+std::string NameOfStatus(const camera_pose_t& message) {
+  constexpr std::array<std::string_view, 6> kNames{
+      "ok", "bad_image", "wrong_size", "no_hypothesis", "low_confidence", "degenerate"};
+  const auto status = static_cast<std::size_t>(message.status);
+  return status < kNames.size() ? std::string(kNames.at(status))
+                                : fmt::format("unknown ({})", message.status);
+}
+
 bool AppendLocalization(std::span<const std::uint8_t> bytes,
                         std::int64_t origin_ns,
                         std::string& text) {
   const auto message = DecodeBounded<localization_t>(bytes);
   if (!message) return false;
-  if (message->status == localization_t::UNINITIALISED) return true;
-  const PlanarPose pose{.X_WB = Pose2(message->x_WB_m, message->y_WB_m, message->yaw_WB_rad),
-                        .covariance = Eigen::Map<const RowMajorMatrix3d>(&message->covariance[0])};
-  AppendPose(message->mono_ns - origin_ns, pose, message->status, text);
+  const std::int64_t time_ns = message->mono_ns - origin_ns;
+  if (message->status == localization_t::UNINITIALISED) {
+    AppendNoPose(time_ns, NameOfStatus(*message), text);
+  } else {
+    AppendPose(time_ns,
+               {.X_WB = Pose2(message->x_WB_m, message->y_WB_m, message->yaw_WB_rad),
+                .covariance = Eigen::Map<const RowMajorMatrix3d>(&message->covariance[0])},
+               NameOfStatus(*message),
+               text);
+  }
+  text += '\n';
   return true;
 }
 
@@ -59,42 +96,60 @@ bool AppendOdometry(std::span<const std::uint8_t> bytes,
   return true;
 }
 
+/// A body at the camera's place, x along the optical axis, z up.
+Pose3 CameraAsBody() {
+  constexpr double kQuarterTurn = 1.5707963267948966;
+  return {RotationFromRollPitchYaw(-kQuarterTurn, 0.0, -kQuarterTurn), Eigen::Vector3d::Zero()};
+}
+
+/// The body's pose where `X_BC` says where this camera is, else the camera's.
 bool AppendCameraPose(std::span<const std::uint8_t> bytes,
-                      std::int64_t origin_ns,
+                      const LogCsvOptions& options,
                       std::string& text) {
   const auto message = DecodeBounded<camera_pose_t>(bytes);
   if (!message) return false;
-  if (message->status != camera_pose_t::STATUS_OK) return true;
-  const Eigen::Quaterniond q_WC(
-      message->quat[0], message->quat[1], message->quat[2], message->quat[3]);
-  const Pose3 X_WC(q_WC, {message->pos[0], message->pos[1], message->pos[2]});
-  // A body at the camera's place, x along the optical axis, z up.
-  constexpr double kQuarterTurn = 1.5707963267948966;
-  const Pose3 X_BC(RotationFromRollPitchYaw(-kQuarterTurn, 0.0, -kQuarterTurn),
-                   Eigen::Vector3d::Zero());
-  const Matrix6d covariance = Eigen::Map<const RowMajorMatrix6d>(&message->covariance[0]);
-  AppendPose(message->mono_ns - origin_ns,
-             ProjectToPlane(X_WC * X_BC.Inverse(), TransportCovariance(covariance, X_BC)),
-             message->status,
-             text);
+  const std::int64_t time_ns = message->mono_ns - options.time_origin_ns;
+  const auto mounted = options.X_BC.find(message->camera);
+  const bool is_mounted = mounted != options.X_BC.end();
+  if (message->status != camera_pose_t::STATUS_OK) {
+    AppendNoPose(time_ns, NameOfStatus(*message), text);
+  } else if (!is_mounted && !options.X_BC.empty()) {
+    AppendNoPose(time_ns, "unknown_camera", text);
+  } else {
+    const Eigen::Quaterniond q_WC(
+        message->quat[0], message->quat[1], message->quat[2], message->quat[3]);
+    const Pose3 X_WC(q_WC, {message->pos[0], message->pos[1], message->pos[2]});
+    const Pose3 X_BC = is_mounted ? mounted->second : CameraAsBody();
+    const Matrix6d covariance = Eigen::Map<const RowMajorMatrix6d>(&message->covariance[0]);
+    AppendPose(time_ns,
+               ProjectToPlane(X_WC * X_BC.Inverse(), TransportCovariance(covariance, X_BC)),
+               NameOfStatus(*message),
+               text);
+  }
+  fmt::format_to(std::back_inserter(text), ",{},{:.4f}\n", message->inliers, message->confidence);
   return true;
 }
 
 }  // namespace
 
-Result<LogCsv> LogCsv::ForChannel(const std::string& channel, std::int64_t time_origin_ns) {
-  constexpr const char* kPoseHeader =
-      "time_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,status\n";
-  constexpr const char* kOdometryHeader = "time_ns,x_m,y_m,heading_rad,flags\n";
-  const auto make = [time_origin_ns](const char* header, auto* append) {
-    return LogCsv(header,
-                  [append, time_origin_ns](std::span<const std::uint8_t> bytes, std::string& text) {
-                    return append(bytes, time_origin_ns, text);
-                  });
-  };
-  if (channel == channels::kLocalization.name) return make(kPoseHeader, &AppendLocalization);
-  if (channel == channels::kOdometry.name) return make(kOdometryHeader, &AppendOdometry);
-  if (channel == channels::kCameraPose.name) return make(kPoseHeader, &AppendCameraPose);
+Result<LogCsv> LogCsv::ForChannel(const std::string& channel, const LogCsvOptions& options) {
+  const std::string pose_header =
+      "time_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,status";
+  if (channel == channels::kLocalization.name) {
+    return LogCsv(pose_header + "\n", [options](auto bytes, std::string& text) {
+      return AppendLocalization(bytes, options.time_origin_ns, text);
+    });
+  }
+  if (channel == channels::kOdometry.name) {
+    return LogCsv("time_ns,x_m,y_m,heading_rad,flags\n", [options](auto bytes, std::string& text) {
+      return AppendOdometry(bytes, options.time_origin_ns, text);
+    });
+  }
+  if (channel == channels::kCameraPose.name) {
+    return LogCsv(pose_header + ",inliers,confidence\n", [options](auto bytes, std::string& text) {
+      return AppendCameraPose(bytes, options, text);
+    });
+  }
   return Error{ErrorKind::kInvalidInput,
                fmt::format("--channel is '{}', must be {}", channel, kChannels)};
 }

@@ -71,6 +71,24 @@ void LogSummary::Add(const LogEvent& event) {
   channel.ages_us.push_back(event.timestamp_us - heading->utime);
 }
 
+std::int64_t LogSummary::Events(const std::string& channel) const {
+  const auto found = channels_.find(channel);
+  return found == channels_.end() ? 0 : found->second.events;
+}
+
+std::int64_t LogSummary::Lost() const {
+  std::int64_t lost = 0;
+  for (const auto& [name, channel] : channels_)
+    lost += channel.monitor.counters().lost;
+  return lost;
+}
+
+double LogSummary::AgePercentileMs(const std::string& channel, double share) const {
+  const auto found = channels_.find(channel);
+  return found == channels_.end() ? std::nan("")
+                                  : Percentile(found->second.ages_us, share) / kUsPerMs;
+}
+
 std::string LogSummary::FormatTable(const LogReader::Counters& counters) const {
   std::string text = fmt::format("{:<24} {:>8} {:>8} {:>9} {:>6} {:>9} {:>9} {:>9}\n",
                                  "channel",

@@ -16,6 +16,13 @@ class LogSummary {
  public:
   void Add(const LogEvent& event);
 
+  [[nodiscard]] std::int64_t Events(const std::string& channel) const;
+  /// Of all channels.
+  [[nodiscard]] std::int64_t Lost() const;
+  /// From the measurement to its arrival at the recorder; NaN for a channel that is not there or
+  /// has no measurements.
+  [[nodiscard]] double AgePercentileMs(const std::string& channel, double share) const;
+
   [[nodiscard]] std::string FormatTable(const LogReader::Counters& counters) const;
   [[nodiscard]] std::string FormatJson(const LogReader::Counters& counters) const;
 

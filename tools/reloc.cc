@@ -25,7 +25,7 @@ struct Verb {
 };
 
 /// What is beside this program and not in here is listed too, without a help text.
-constexpr std::array<Verb, 10> kVerbs{{
+constexpr std::array<Verb, 11> kVerbs{{
     {"status", "how the daemons are, and where the robot is"},
     {"check-config", "whether a robot's config is right"},
     {"map", "train a map from a drive, localize images in it, say what is in it"},
@@ -34,6 +34,7 @@ constexpr std::array<Verb, 10> kVerbs{{
     {"replay", "a recorded log through the daemons' code, exactly"},
     {"log", "inspect, cut, repair and export recorded logs"},
     {"eval", "compare a trajectory with the truth"},
+    {"report", "a drive's errors, coverage and latencies: tables, plots, a page"},
     {"sim", "a simulated robot's CAN frames and truth"},
     {"import", "bring a public data set into our layout"},
 }};

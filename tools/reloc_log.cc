@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
 
+#include "config/config.h"
 #include "core/exit_code.h"
 #include "log_csv.h"
 #include "log_summary.h"
@@ -58,13 +59,21 @@ struct ExportOptions {
   std::string log;
   std::string channel;
   std::string out;
+  std::string config;
   std::int64_t time_origin_ns = 0;
 };
 
 Result<int> Export(const ExportOptions& options) {
   auto reader = LogReader::Open(options.log);
   if (!reader) return std::move(reader).error();
-  auto csv = LogCsv::ForChannel(options.channel, options.time_origin_ns);
+  LogCsvOptions rows{.time_origin_ns = options.time_origin_ns, .X_BC = {}};
+  if (!options.config.empty()) {
+    const auto config = LoadConfig(options.config, {});
+    if (!config) return config.error();
+    for (const auto& [name, camera] : config->cameras)
+      rows.X_BC.emplace(name, camera.X_BC());
+  }
+  auto csv = LogCsv::ForChannel(options.channel, rows);
   if (!csv) return std::move(csv).error();
   std::string text = csv->header();
   std::int64_t undecodable = 0;
@@ -113,6 +122,11 @@ int main(int argc, char** argv) {
   exporting->add_option("--channel", options.channel, relocd::LogCsv::kChannels)->required();
   exporting->add_option("--out", options.out, "the CSV file")->required();
   exporting->add_option("--time-origin-ns", options.time_origin_ns, "taken off every mono_ns");
+  exporting->add_option(
+      "--config",
+      options.config,
+      "the robot's YAML file: CAMERA_POSE then gives the body's pose, by where the "
+      "camera is mounted");
 
   try {
     app.parse(argc, argv);

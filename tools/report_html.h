@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "report_frames.h"
+#include "report_numbers.h"
+
+namespace relocd {
+
+/// A figure for readers with a light and with a dark screen, as PNG.
+struct ReportFigure {
+  std::string light_png;
+  std::string dark_png;
+};
+
+/// The report as one page that needs nothing else: no links, no scripts, pictures within.
+std::string FormatReportHtml(const DriveReport& report,
+                             const ReportFigure& drive,
+                             const ReportFigure& errors,
+                             const std::vector<ReportFrame>& frames);
+
+/// RFC 4648, with padding.
+std::string EncodeBase64(std::string_view bytes);
+
+}  // namespace relocd
