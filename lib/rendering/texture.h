@@ -49,7 +49,8 @@ class Texture {
   Texture() = default;
 
   [[nodiscard]] float LevelOf(float footprint) const;
-  [[nodiscard]] Eigen::Array4f SampleLevel(const Level& level, float u, float v) const;
+  /// sRGB and coverage, each in [0, 255]: between texels, sRGB is interpolated.
+  static Eigen::Array4f SampleLevel(const Level& level, float u, float v);
 
   std::vector<Level> levels_;  ///< Each half as large as the one before, down to 1 x 1.
   bool is_opaque_ = true;

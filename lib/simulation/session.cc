@@ -38,20 +38,20 @@ const std::vector<Trait>& Traits() {
       {{"overcast", "no sun, no shadows"},
        [](Session& session) {
          session.sun_strength = 0.0;
-         session.sky_brightness = 0.9;
+         session.sky_brightness = std::min(session.sky_brightness, 0.9);
          session.haze_per_m = 0.0012;
        }},
       {{"dusk", "the sun is down, street lamps and windows are lit"},
        [](Session& session) {
          session.sun_strength = 0.0;
-         session.sky_brightness = 0.06;
+         session.sky_brightness = std::min(session.sky_brightness, 0.06);
          session.lamps_on = true;
        }},
       {{"wet", "a wet road that mirrors"}, [](Session& session) { session.wetness = 1.0; }},
       {{"rain", "overcast, wet, rain streaks and drops on the lens"},
        [](Session& session) {
          session.sun_strength = 0.0;
-         session.sky_brightness = 0.6;
+         session.sky_brightness = std::min(session.sky_brightness, 0.6);
          session.haze_per_m = 0.004;
          session.wetness = 1.0;
          session.rain = 1.0;
