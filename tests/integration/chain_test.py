@@ -61,13 +61,40 @@ def play(out, *beside):
 def localization(log, out, channel="LOCALIZATION"):
     table = out / f"{channel}.csv"
     epoch = (WORK / "live/epoch_ns").read_text().strip() if not (out / "epoch_ns").exists() else (out / "epoch_ns").read_text().strip()
-    run(BIN / "reloc", "log", "export", log, "--channel", channel, "--time-origin-ns", epoch, "--out", table)
+    run(BIN / "reloc", "log", "export", log, "--channel", channel, "--config", WORK / "live/robot.yaml", "--time-origin-ns", epoch, "--out", table)
     return table
 
 
+def evaluate(table, *options):
+    return json.loads(output_of(BIN / "reloc", "eval", "--truth", TRUTH, "--estimate", table, "--json", *options))
+
+
 def mean_error_m(table):
-    report = json.loads(output_of(BIN / "reloc", "eval", "--truth", TRUTH, "--estimate", table, "--json"))
-    return report["position_m"]["mean"]
+    return evaluate(table)["position_m"]["mean"]
+
+
+def check_report(log, out):
+    """The report of the drive says what reloc eval, the log and the daemons say."""
+    tables = {channel: localization(log, out, channel) for channel in ("ODOMETRY", "CAMERA_POSE", "LOCALIZATION")}
+    run(BIN / "reloc", "report", "--title", "The generated street", "--truth", TRUTH, "--odometry", tables["ODOMETRY"], "--camera", tables["CAMERA_POSE"],
+        "--fused", tables["LOCALIZATION"], "--log", log, "--time-origin-ns", (out / "epoch_ns").read_text().strip(), "--dataset", STREET,
+        "--teach-dataset", STREET, "--out", out / "report")
+    report = json.loads((out / "report/report.json").read_text())
+    for row, table in (("camera", "CAMERA_POSE"), ("fused", "LOCALIZATION")):
+        evaluation = evaluate(tables[table])
+        check(report[row]["position_m"] == evaluation["position_m"], f"{row}: the report has reloc eval's errors of position")
+        check(report[row]["heading_deg"] == evaluation["rotation_deg"], f"{row}: the report has reloc eval's errors of heading")
+        check(report[row]["coverage"] == evaluation["coverage"], f"{row}: the report has reloc eval's coverage")
+    aligned = evaluate(tables["ODOMETRY"], "--align")["aligned_position_m"]
+    check(abs(report["odometry_aligned"]["position_m"]["mean"] - aligned["mean"]) < 1e-6, "aligned odometry is as good as reloc eval says")
+    check(report["odometry"]["position_m"]["mean"] >= aligned["mean"], "odometry from the true start is no better than aligned")
+    images = report["images"]
+    check(images["worked_on"] == images["poses"] + sum(images["without_pose"].values()), "each image gave a pose or a reason")
+    check(report["images_taken"] == FRAMES, "the report counts every image")
+    check(abs(sum(report["status_share"].values()) - 1.0) < 1e-9, "the statuses' shares are all of the time")
+    check(0.0 < report["latency_ms"]["can_to_pose"]["p50"] <= report["latency_ms"]["can_to_pose"]["p99"], "latencies are there and in order")
+    page = (out / "report/report.html").read_text()
+    check(page.count("data:image/png") == 4 and page.count("data:image/jpeg") == 16, "the page has its figures and both drives' images")
 
 
 def live():
@@ -88,6 +115,7 @@ def live():
 
     error_m = mean_error_m(localization(log, out))
     check(error_m < 1.5, f"mean error of the live pose is {error_m:.3f} m")
+    check_report(log, out)
 
 
 def live_log():
@@ -167,7 +195,7 @@ def kill():
     rows = []
     for log in logs:
         with open(localization(log, out)) as table:
-            rows += [(int(row["time_ns"]), float(row["x_m"]), float(row["y_m"])) for row in csv.DictReader(table)]
+            rows += [(int(row["time_ns"]), float(row["x_m"]), float(row["y_m"])) for row in csv.DictReader(table) if row["x_m"]]
     rows.sort()
     gaps_s = [(b[0] - a[0]) * 1e-9 for a, b in zip(rows, rows[1:])]
     check(max(gaps_s) < 1.5, f"the pose goes on: no gap above {max(gaps_s):.2f} s")
