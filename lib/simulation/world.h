@@ -25,6 +25,12 @@ class Ground {
 
   /// z in W, m, below or above any point of the plane.
   [[nodiscard]] virtual double HeightAt(const Eigen::Vector2d& p_W) const = 0;
+
+  /// The same of the surface nearest to `z_W`, for what drives over and under bridges: the height
+  /// a moment before says on which of them it is.
+  [[nodiscard]] virtual double HeightNear(const Eigen::Vector2d& p_W, double /*z_W*/) const {
+    return HeightAt(p_W);
+  }
 };
 
 /// A line in the plane to drive or walk along, in its order. Points are 0.2 m to 5 m apart, without

@@ -1,0 +1,307 @@
+#include "simulation/torcs_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "rendering/read_image.h"
+#include "rendering/rgba_image.h"
+
+namespace relocd {
+namespace {
+
+constexpr float kAlphaCutoff = 0.5F;
+constexpr float kLeafTranslucency = 0.25F;
+constexpr float kWallReflectance = 0.85F;  ///< Of the brightest texture: none is a perfect white.
+constexpr float kCreaseCosine = 0.7F;      ///< Edges that are sharper are not smoothed.
+constexpr float kCoincidenceShiftM = 0.005F;
+constexpr float kSmallestAreaM2 = 1e-8F;
+
+Eigen::Vector3f ToWorld(const Eigen::Vector3f& p_A) {
+  return {p_A.x(), -p_A.z(), p_A.y()};
+}
+
+/// A triangle of a surface, as the indices of three of its corners.
+using CornerTriple = std::array<std::size_t, 3>;
+
+/// Fans and strips; lines have none.
+std::vector<CornerTriple> TrianglesOf(const Ac3dSurface& surface) {
+  std::vector<CornerTriple> triangles;
+  const std::size_t count = surface.corners.size();
+  for (std::size_t i = 2; i < count; ++i) {
+    if (surface.kind == Ac3dSurface::Kind::kPolygon) {
+      triangles.push_back({0, i - 1, i});
+    } else if (surface.kind == Ac3dSurface::Kind::kTriangleStrip) {
+      const bool is_even = i % 2 == 0;
+      triangles.push_back({is_even ? i - 2 : i - 1, is_even ? i - 1 : i - 2, i});
+    }
+  }
+  return triangles;
+}
+
+/// An object's vertices and normals in W.
+struct PlacedObject {
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<Eigen::Vector3f> normals;
+};
+
+PlacedObject Place(const Ac3dModel& model, std::size_t index) {
+  const Ac3dObject& object = model.objects[index];
+  const Eigen::Affine3f X_AO = model.PlaceOf(index);
+  PlacedObject placed;
+  for (const Eigen::Vector3f& vertex : object.vertices) {
+    placed.positions.push_back(ToWorld(X_AO * vertex));
+  }
+  for (const Eigen::Vector3f& normal : object.normals) {
+    placed.normals.push_back(ToWorld(X_AO.linear() * normal));
+  }
+  return placed;
+}
+
+/// For each vertex the normals of the smooth faces round it, as long as twice their areas.
+std::vector<std::vector<Eigen::Vector3f>> FaceNormals(const Ac3dObject& object,
+                                                      const PlacedObject& placed) {
+  std::vector<std::vector<Eigen::Vector3f>> normals(placed.positions.size());
+  for (const Ac3dSurface& surface : object.surfaces) {
+    if (!surface.is_smooth) continue;
+    for (const CornerTriple& triangle : TrianglesOf(surface)) {
+      std::array<std::uint32_t, 3> vertices{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        vertices.at(i) = surface.corners[triangle.at(i)].vertex;
+      }
+      const Eigen::Vector3f& a = placed.positions[vertices[0]];
+      const Eigen::Vector3f normal =
+          (placed.positions[vertices[1]] - a).cross(placed.positions[vertices[2]] - a);
+      for (const std::uint32_t vertex : vertices) {
+        normals[vertex].push_back(normal);
+      }
+    }
+  }
+  return normals;
+}
+
+/// Puts all surfaces into one mesh and a scene's materials.
+class SceneBuilder {
+ public:
+  SceneBuilder(const Ac3dModel& model, const TorcsSceneOptions& options, const std::string& path)
+      : model_(model), options_(options), path_(path) {}
+
+  Result<Scene> Build() {
+    for (std::size_t i = 0; i < model_.objects.size(); ++i) {
+      if (model_.objects[i].surfaces.empty()) continue;
+      if (auto ok = AddObject(i); !ok) return ok.error();
+    }
+    SeparateCoincident();
+    const std::uint32_t mesh = scene_.AddMesh(std::move(mesh_));
+    scene_.instances.push_back({.mesh = mesh});
+    return std::move(scene_);
+  }
+
+ private:
+  /// Texture (-1: none), material of the model, on the road.
+  using MaterialKey = std::tuple<int, std::uint32_t, bool>;
+
+  Result<void> AddObject(std::size_t index);
+  Result<int> TextureOf(const Ac3dObject& object);
+  std::uint32_t MaterialOf(const Ac3dObject& object, const MaterialKey& key);
+  void SeparateCoincident();
+
+  const Ac3dModel& model_;
+  const TorcsSceneOptions& options_;
+  const std::string& path_;
+  Scene scene_;
+  Mesh mesh_;
+  std::map<std::string, int> textures_;
+  std::map<MaterialKey, std::uint32_t> materials_;
+};
+
+Result<int> SceneBuilder::TextureOf(const Ac3dObject& object) {
+  if (object.texture.empty()) return -1;
+  if (const auto known = textures_.find(object.texture); known != textures_.end())
+    return known->second;
+  const auto context = [&] {
+    return fmt::format("{}: line {}: object '{}'", path_, object.line, object.name);
+  };
+  // What a file of unknown origin asks for stays in the folders.
+  const std::string file = std::filesystem::path(object.texture).filename().string();
+  for (const std::string& folder : options_.texture_folders) {
+    const std::string image_path = folder + "/" + file;
+    std::error_code ignored;
+    if (file.empty() || !std::filesystem::is_regular_file(image_path, ignored)) continue;
+    auto image = ReadRgbaImage(image_path);
+    if (!image) return std::move(image).error().WithContext(context());
+    const RgbaImage fitting = ResampleToPowersOfTwo(std::move(image).value(), Texture::kMaxSide);
+    auto texture = Texture::Create(fitting.width, fitting.height, fitting.pixels);
+    if (!texture) return std::move(texture).error().WithContext(context());
+    const auto number = static_cast<int>(scene_.AddTexture(std::move(texture).value()));
+    textures_.emplace(object.texture, number);
+    return number;
+  }
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("{}: texture '{}' is in none of the folders {}",
+                           context(),
+                           object.texture,
+                           fmt::join(options_.texture_folders, ", "))};
+}
+
+bool HasWord(const std::string& text, std::initializer_list<const char*> words) {
+  std::string lower = text;
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return std::any_of(words.begin(), words.end(), [&](const char* word) {
+    return lower.find(word) != std::string::npos;
+  });
+}
+
+std::uint32_t SceneBuilder::MaterialOf(const Ac3dObject& object, const MaterialKey& key) {
+  if (const auto known = materials_.find(key); known != materials_.end()) return known->second;
+  const auto& [texture, number, is_road] = key;
+  Material material{.name = object.texture, .texture = texture};
+  if (texture >= 0) {
+    material.albedo = Eigen::Array3f::Constant(kWallReflectance);
+    const bool has_holes = !scene_.textures[static_cast<std::size_t>(texture)].is_opaque();
+    if (has_holes) material.alpha_cutoff = kAlphaCutoff;
+    if (has_holes && HasWord(object.texture, {"tree", "bush", "leaf"}))
+      material.translucency = kLeafTranslucency;
+  } else {
+    const Ac3dMaterial& plain = model_.materials[number];
+    material.name = plain.name;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      material.albedo[i] =
+          LinearFromSrgb(static_cast<std::uint8_t>(std::lround(255.0F * plain.colour[i])));
+    }
+  }
+  if (is_road) {
+    const bool is_loose = HasWord(object.texture, {"dirt", "sand", "grass", "gravel", "mud"});
+    material.wet_darkening = 0.4F;
+    material.wet_reflectivity = is_loose ? 0.01F : 0.04F;
+  }
+  const std::uint32_t index = scene_.AddMaterial(std::move(material));
+  materials_.emplace(key, index);
+  return index;
+}
+
+Result<void> SceneBuilder::AddObject(std::size_t index) {
+  const Ac3dObject& object = model_.objects[index];
+  const auto texture = TextureOf(object);
+  if (!texture) return texture.error();
+  const PlacedObject placed = Place(model_, index);
+  const auto face_normals = object.normals.empty() ? FaceNormals(object, placed)
+                                                   : std::vector<std::vector<Eigen::Vector3f>>();
+  const auto normal_at = [&](std::uint32_t vertex, const Eigen::Vector3f& face) {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    if (!placed.normals.empty()) {
+      sum = placed.normals[vertex];
+    } else {
+      for (const Eigen::Vector3f& normal : face_normals[vertex]) {
+        if (normal.dot(face) > kCreaseCosine * normal.norm()) sum += normal;
+      }
+    }
+    const float length = sum.norm();
+    // A normal that does not fit its face is worse than none.
+    return length > 0.0F && sum.dot(face) > 0.3F * length ? Eigen::Vector3f(sum / length) : face;
+  };
+  for (const Ac3dSurface& surface : object.surfaces) {
+    for (const CornerTriple& triangle : TrianglesOf(surface)) {
+      std::array<Eigen::Vector3f, 3> p_Ws;
+      for (std::size_t i = 0; i < 3; ++i) {
+        p_Ws.at(i) = placed.positions[surface.corners[triangle.at(i)].vertex];
+      }
+      const Eigen::Vector3f cross = (p_Ws[1] - p_Ws[0]).cross(p_Ws[2] - p_Ws[0]);
+      if (!(cross.norm() > kSmallestAreaM2)) continue;
+      const Eigen::Vector3f face = cross.normalized();
+      const bool is_road =
+          options_.is_road && options_.is_road((p_Ws[0] + p_Ws[1] + p_Ws[2]) / 3.0F);
+      const std::uint32_t material =
+          MaterialOf(object, {*texture, *texture >= 0 ? 0U : surface.material, is_road});
+      const auto first = static_cast<std::uint32_t>(mesh_.positions.size());
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Ac3dCorner& corner = surface.corners[triangle.at(i)];
+        const Eigen::Vector2f uv =
+            corner.uv.cwiseProduct(object.texture_repeat) + object.texture_offset;
+        mesh_.positions.push_back(p_Ws.at(i));
+        mesh_.normals.push_back(surface.is_smooth ? normal_at(corner.vertex, face) : face);
+        mesh_.uvs.emplace_back(uv.x(), 1.0F - uv.y());
+      }
+      mesh_.triangles.push_back({first, first + 1, first + 2});
+      mesh_.triangle_materials.push_back(material);
+    }
+  }
+  return {};
+}
+
+/// Boards have a front and a back in one place, each drawn from its own side. Rays would find
+/// either.
+void SceneBuilder::SeparateCoincident() {
+  std::map<std::array<float, 9>, std::vector<std::size_t>> triangles_at;
+  for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
+    std::array<std::array<float, 3>, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3f& p = mesh_.positions[mesh_.triangles[i].at(k)];
+      corners.at(k) = {p.x(), p.y(), p.z()};
+    }
+    std::sort(corners.begin(), corners.end());
+    std::array<float, 9> key{};
+    for (std::size_t k = 0; k < 9; ++k) {
+      key.at(k) = corners.at(k / 3).at(k % 3);
+    }
+    triangles_at[key].push_back(i);
+  }
+  for (const auto& [key, triangles] : triangles_at) {
+    for (std::size_t n = 0; triangles.size() > 1 && n < triangles.size(); ++n) {
+      const auto& [a, b, c] = mesh_.triangles[triangles[n]];
+      const Eigen::Vector3f p_WA = mesh_.positions[a];
+      const Eigen::Vector3f normal =
+          (mesh_.positions[b] - p_WA).cross(mesh_.positions[c] - p_WA).normalized();
+      const Eigen::Vector3f shift = kCoincidenceShiftM * static_cast<float>(n + 1) * normal;
+      for (const std::uint32_t vertex : {a, b, c}) {
+        mesh_.positions[vertex] += shift;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3f> VerticesInWorld(const Ac3dModel& model) {
+  std::vector<Eigen::Vector3f> vertices;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    const auto placed = Place(model, i);
+    vertices.insert(vertices.end(), placed.positions.begin(), placed.positions.end());
+  }
+  return vertices;
+}
+
+std::vector<std::array<Eigen::Vector3f, 3>> TrianglesInWorld(const Ac3dModel& model) {
+  std::vector<std::array<Eigen::Vector3f, 3>> triangles;
+  for (std::size_t i = 0; i < model.objects.size(); ++i) {
+    const auto placed = Place(model, i);
+    for (const Ac3dSurface& surface : model.objects[i].surfaces) {
+      for (const auto& [a, b, c] : TrianglesOf(surface)) {
+        triangles.push_back({placed.positions[surface.corners[a].vertex],
+                             placed.positions[surface.corners[b].vertex],
+                             placed.positions[surface.corners[c].vertex]});
+      }
+    }
+  }
+  return triangles;
+}
+
+Result<Scene> MakeTorcsScene(const Ac3dModel& model,
+                             const TorcsSceneOptions& options,
+                             const std::string& path) {
+  return SceneBuilder(model, options, path).Build();
+}
+
+}  // namespace relocd
