@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "messaging/image_metadata.h"
+#include "messaging/image_message.h"
 
 namespace relocd {
 namespace {
@@ -47,20 +47,8 @@ void CameraNode::Publish(Frame frame, const ClockReading& now) {
   image_bytes_ = frame.bytes.size();
   age_ = now.monotonic - frame.time;
 
-  image_t message{};
-  message.utime = now.RealtimeUsAt(frame.time);
-  message.width = frame.width;
-  message.height = frame.height;
-  message.row_stride = frame.bytes_per_line;
-  message.pixelformat = static_cast<std::int32_t>(frame.fourcc);
-  message.size = static_cast<std::int32_t>(frame.bytes.size());
-  message.data = std::move(frame.bytes);
-  SetImageMetadata({.mono_ns = ToNanoseconds(frame.time),
-                    .seq = seq_++,
-                    .run_id = run_id_,
-                    .flags = frame.flags,
-                    .exposure_us = frame.exposure_us},
-                   message);
+  const ImageStamp stamp{.utime = now.RealtimeUsAt(frame.time), .seq = seq_++, .run_id = run_id_};
+  const image_t message = ToMessage(std::move(frame), stamp);
   const auto sent = bus_.Publish(channel_, message);
   publish_error_ = sent ? "" : sent.error().message;
   if (!sent) ++publish_failures_;

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "messaging/can_frame_message.h"
+
 namespace relocd {
 namespace {
 
@@ -29,25 +31,6 @@ constexpr Duration kSilence = std::chrono::milliseconds(500);
 constexpr Duration kTroubleShown = std::chrono::seconds(2);
 /// A controller that is to restart by itself does so within this time.
 constexpr Duration kBusOffPatience = std::chrono::seconds(1);
-
-can_frame_t ToMessage(const CanFrame& frame) {
-  can_frame_t message{};
-  message.mono_ns = ToNanoseconds(frame.receive_time);
-  // The kernel's flags are in the topmost bits of an unsigned number.
-  message.can_id = static_cast<std::int32_t>(KernelCanId(frame));
-  message.size = frame.size;
-  message.data.assign(frame.payload().begin(), frame.payload().end());
-  return message;
-}
-
-CanFrame FromMessage(const can_frame_t& message) {
-  CanFrame frame;
-  SetKernelCanId(frame, static_cast<std::uint32_t>(message.can_id));
-  frame.receive_time = FromNanoseconds(message.mono_ns);
-  frame.SetPayload(message.data);
-  frame.fd = frame.size > CanFrame::kMaxClassicalSize;
-  return frame;
-}
 
 std::string FlagNames(std::int32_t flags) {
   constexpr std::array<std::pair<std::int32_t, const char*>, 4> kNames = {{

@@ -36,4 +36,8 @@ Result<std::vector<std::uint8_t>> BoundedJpegEncoder::Encode(const GrayImage& im
   return EncodeBounded([&](int quality) { return EncodeGrayToJpeg(image, quality); });
 }
 
+Result<std::vector<std::uint8_t>> BoundedJpegEncoder::Encode(const RgbImage& image) {
+  return EncodeBounded([&](int quality) { return EncodeRgbToJpeg(image, quality); });
+}
+
 }  // namespace relocd

@@ -9,7 +9,7 @@
 
 namespace relocd {
 
-/// Encodes a camera's raw images to JPEGs that stay below a size: an image that comes out larger is
+/// Encodes raw images to JPEGs that stay below a size: an image that comes out larger is
 /// encoded again with less quality, and the quality returns step by step when there is room.
 class BoundedJpegEncoder {
  public:
@@ -19,6 +19,7 @@ class BoundedJpegEncoder {
   /// An image that is too large even at the lowest quality comes out at that.
   Result<std::vector<std::uint8_t>> Encode(const YuyvView& image);
   Result<std::vector<std::uint8_t>> Encode(const GrayImage& image);
+  Result<std::vector<std::uint8_t>> Encode(const RgbImage& image);
 
   /// Of the next image.
   [[nodiscard]] int quality() const { return quality_; }

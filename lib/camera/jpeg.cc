@@ -132,6 +132,52 @@ Result<void> CheckYuyv(const YuyvView& image) {
   return {};
 }
 
+/// Pixels as libjpeg-turbo takes them: row-major, without padding.
+struct Pixels {
+  std::span<const std::uint8_t> pixels;
+  int width = 0;
+  int height = 0;
+  int channels = 1;
+  int format = TJPF_GRAY;
+  int subsampling = TJSAMP_GRAY;
+};
+
+Result<std::vector<std::uint8_t>> EncodePixels(const Pixels& image, int quality) {
+  if (auto fits = CheckSize("encoding JPEG", image.width, image.height); !fits) {
+    return std::move(fits).error();
+  }
+  const std::int64_t needed = std::int64_t{image.width} * image.height * image.channels;
+  if (std::ssize(image.pixels) != needed) {
+    return Invalid(fmt::format("encoding JPEG: {} bytes for {} x {} px, must be {}",
+                               image.pixels.size(),
+                               image.width,
+                               image.height,
+                               needed));
+  }
+  if (auto valid = CheckQuality(quality); !valid) return std::move(valid).error();
+  auto handle = Checked(tjInitCompress());
+  if (!handle) return std::move(handle).error();
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;
+  const int failed = tjCompress2(handle->get(),
+                                 image.pixels.data(),
+                                 image.width,
+                                 image.width * image.channels,
+                                 image.height,
+                                 image.format,
+                                 &bytes,
+                                 &size,
+                                 image.subsampling,
+                                 quality,
+                                 0);
+  const std::unique_ptr<unsigned char, FreeTurbo> owned(bytes);
+  if (failed != 0) {
+    return Error{ErrorKind::kInternal,
+                 fmt::format("encoding JPEG: {}", tjGetErrorStr2(handle->get()))};
+  }
+  return CopyOut(bytes, size);
+}
+
 }  // namespace
 
 std::optional<std::span<const std::uint8_t>> FindWholeJpeg(std::span<const std::uint8_t> buffer) {
@@ -179,35 +225,23 @@ Result<GrayImage> DecodeJpegToGray(std::span<const std::uint8_t> jpeg) {
 }
 
 Result<std::vector<std::uint8_t>> EncodeGrayToJpeg(const GrayImage& image, int quality) {
-  if (auto fits = CheckSize("encoding JPEG", image.width, image.height); !fits) {
-    return std::move(fits).error();
-  }
-  if (std::ssize(image.pixels) != std::int64_t{image.width} * image.height) {
-    return Invalid(fmt::format(
-        "encoding JPEG: {} pixels for {} x {} px", image.pixels.size(), image.width, image.height));
-  }
-  if (auto valid = CheckQuality(quality); !valid) return std::move(valid).error();
-  auto handle = Checked(tjInitCompress());
-  if (!handle) return std::move(handle).error();
-  unsigned char* bytes = nullptr;
-  unsigned long size = 0;
-  const int failed = tjCompress2(handle->get(),
-                                 image.pixels.data(),
-                                 image.width,
-                                 image.width,
-                                 image.height,
-                                 TJPF_GRAY,
-                                 &bytes,
-                                 &size,
-                                 TJSAMP_GRAY,
-                                 quality,
-                                 0);
-  const std::unique_ptr<unsigned char, FreeTurbo> owned(bytes);
-  if (failed != 0) {
-    return Error{ErrorKind::kInternal,
-                 fmt::format("encoding JPEG: {}", tjGetErrorStr2(handle->get()))};
-  }
-  return CopyOut(bytes, size);
+  return EncodePixels({.pixels = image.pixels,
+                       .width = image.width,
+                       .height = image.height,
+                       .channels = 1,
+                       .format = TJPF_GRAY,
+                       .subsampling = TJSAMP_GRAY},
+                      quality);
+}
+
+Result<std::vector<std::uint8_t>> EncodeRgbToJpeg(const RgbImage& image, int quality) {
+  return EncodePixels({.pixels = image.pixels,
+                       .width = image.width,
+                       .height = image.height,
+                       .channels = 3,
+                       .format = TJPF_RGB,
+                       .subsampling = TJSAMP_420},
+                      quality);
 }
 
 Result<std::vector<std::uint8_t>> EncodeYuyvToJpeg(const YuyvView& image, int quality) {

@@ -51,6 +51,8 @@ Result<GrayImage> DecodeJpegToGray(std::span<const std::uint8_t> jpeg);
 /// @param quality  1 (smallest) to 100.
 /// @return kInvalidInput when the image's size does not fit its pixels or the limits of this file.
 Result<std::vector<std::uint8_t>> EncodeGrayToJpeg(const GrayImage& image, int quality);
+/// With half as much colour as brightness each way, as most cameras make it.
+Result<std::vector<std::uint8_t>> EncodeRgbToJpeg(const RgbImage& image, int quality);
 /// Keeps the camera's 4:2:2 colour and its range of values.
 Result<std::vector<std::uint8_t>> EncodeYuyvToJpeg(const YuyvView& image, int quality);
 

@@ -57,6 +57,29 @@ TEST(JpegTest, YuyvKeepsItsBrightness) {
   EXPECT_LE(WorstDifference(image, *decoded), 6);
 }
 
+TEST(JpegTest, RgbKeepsItsBrightness) {
+  RgbImage image{.width = 64, .height = 32, .pixels = {}};
+  for (int v = 0; v < image.height; ++v) {
+    for (int u = 0; u < image.width; ++u) {
+      for (const int value : {4 * u, 255 - 4 * u, 7 * v})
+        image.pixels.push_back(static_cast<std::uint8_t>(value));
+    }
+  }
+  const auto jpeg = EncodeRgbToJpeg(image, 95);
+  ASSERT_TRUE(jpeg) << jpeg.error().message;
+  const auto decoded = DecodeJpegToGray(*jpeg);
+  ASSERT_TRUE(decoded);
+  for (std::size_t i = 0; i < decoded->pixels.size(); ++i) {
+    // ITU-R BT.601, which JPEG takes.
+    const double brightness = 0.299 * image.pixels[3 * i] + 0.587 * image.pixels[3 * i + 1] +
+                              0.114 * image.pixels[3 * i + 2];
+    ASSERT_NEAR(decoded->pixels[i], brightness, 4.0) << i;
+  }
+  image.pixels.pop_back();
+  EXPECT_EQ(EncodeRgbToJpeg(image, 95).error().message,
+            "encoding JPEG: 6143 bytes for 64 x 32 px, must be 6144");
+}
+
 TEST(JpegTest, LowerQualityIsSmaller) {
   EXPECT_LT(MakeTestJpeg(320, 240, 20).size(), MakeTestJpeg(320, 240, 95).size());
 }
@@ -65,7 +88,7 @@ TEST(JpegTest, RefusesWhatCannotBeEncoded) {
   EXPECT_EQ(EncodeGrayToJpeg(MakeTestImage(8, 8), 0).error().message,
             "encoding JPEG: the quality is 0, must be in [1, 100]");
   EXPECT_EQ(EncodeGrayToJpeg({.width = 8, .height = 8, .pixels = {1, 2}}, 80).error().message,
-            "encoding JPEG: 2 pixels for 8 x 8 px");
+            "encoding JPEG: 2 bytes for 8 x 8 px, must be 64");
   EXPECT_EQ(EncodeGrayToJpeg({.width = 0, .height = 8, .pixels = {}}, 80).error().message,
             "encoding JPEG: the image is 0 x 8 px, must have sides in [1, 8192] and at most "
             "32000000 pixels");
