@@ -25,10 +25,16 @@ Result<void> WriteAll(int fd, std::string_view bytes, const std::string& path) {
     }
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
-  if (::fsync(fd) != 0) {
-    return SystemError(ErrorKind::kUnavailable, fmt::format("syncing {}", path));
-  }
   return {};
+}
+
+/// Creates the file, or empties it.
+Result<UniqueFd> OpenToWrite(const std::string& path) {
+  UniqueFd fd(::open(path.c_str(),
+                     O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
+                     S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH));
+  if (!fd.valid()) return SystemError(ErrorKind::kUnavailable, fmt::format("opening {}", path));
+  return fd;
 }
 
 /// Makes a rename durable. Best effort: some file systems do not sync folders.
@@ -60,16 +66,21 @@ Result<std::string> ReadFile(const std::string& path) {
   }
 }
 
+Result<void> WriteFile(const std::string& path, std::string_view bytes) {
+  const auto fd = OpenToWrite(path);
+  if (!fd) return fd.error();
+  return WriteAll(fd->get(), bytes, path);
+}
+
 Result<void> WriteFileAtomically(const std::string& path, std::string_view bytes) {
   const std::string temporary = fmt::format("{}.tmp.{}", path, ::getpid());
   const auto write = [&]() -> Result<void> {
-    const UniqueFd fd(::open(temporary.c_str(),
-                             O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
-                             S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH));
-    if (!fd.valid()) {
-      return SystemError(ErrorKind::kUnavailable, fmt::format("opening {}", temporary));
+    const auto fd = OpenToWrite(temporary);
+    if (!fd) return fd.error();
+    if (auto ok = WriteAll(fd->get(), bytes, temporary); !ok) return ok;
+    if (::fsync(fd->get()) != 0) {
+      return SystemError(ErrorKind::kUnavailable, fmt::format("syncing {}", temporary));
     }
-    if (auto ok = WriteAll(fd.get(), bytes, temporary); !ok) return ok;
     if (::rename(temporary.c_str(), path.c_str()) != 0) {
       return SystemError(ErrorKind::kUnavailable,
                          fmt::format("renaming {} to {}", temporary, path));

@@ -13,6 +13,11 @@ Error SystemError(ErrorKind kind, std::string_view doing);
 /// The whole file. @return kUnavailable when it cannot be read.
 Result<std::string> ReadFile(const std::string& path);
 
+/// Creates the file or replaces its content, without waiting for the disk. A reader may see a part.
+///
+/// @return kUnavailable when it cannot be written whole.
+Result<void> WriteFile(const std::string& path, std::string_view bytes);
+
 /// Replaces the file by `bytes` such that a reader, also one after a power cut, sees the old or the
 /// new content whole: writes beside it, syncs, renames, syncs the folder.
 ///

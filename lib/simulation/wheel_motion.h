@@ -19,7 +19,7 @@ inline constexpr std::size_t kWheels = 4;
 /// What a vehicle's wheels truly do at one time.
 struct WheelMotion {
   std::int64_t time_ns = 0;
-  Pose2 X_WB;
+  Pose2 X_WB{};
   std::array<double, kWheels> travel_m{};  ///< Since the begin, backwards negative.
   /// The mean over the period around this time, as sensors that count have it.
   std::array<double, kWheels> speeds_mps{};

@@ -44,6 +44,18 @@ TEST_F(FileTest, KeepsTheOldFileWhenTheNewOneCannotTakeItsPlace) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
+TEST_F(FileTest, WritesOverWhatWasThere) {
+  ASSERT_TRUE(WriteFile(folder_ + "/image", "a long one"));
+  ASSERT_TRUE(WriteFile(folder_ + "/image", "short"));
+  EXPECT_EQ(ReadFile(folder_ + "/image").value(), "short");
+}
+
+TEST_F(FileTest, SaysThatTheDiskIsFull) {
+  const auto ok = WriteFile("/dev/full", "x");
+  ASSERT_FALSE(ok);
+  EXPECT_EQ(ok.error().message, "writing /dev/full: No space left on device");
+}
+
 TEST_F(FileTest, NamesWhatItCannotOpen) {
   const auto missing = ReadFile(folder_ + "/none");
   ASSERT_FALSE(missing);
