@@ -11,8 +11,10 @@
 #include <span>
 #include <thread>
 
+#ifdef __SSE2__
 #include <pmmintrin.h>
 #include <xmmintrin.h>
+#endif
 
 #include "core/check.h"
 #include "core/counter_random.h"
@@ -72,8 +74,10 @@ float SchlickFresnel(float reflectivity, float cosine) {
 
 /// Embree works several times slower on denormal numbers.
 void FlushDenormals() {
+#ifdef __SSE2__
   _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
   _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+#endif
 }
 
 }  // namespace
@@ -125,8 +129,8 @@ class ImageRenderer::TileRenderer {
         random_(seed),
         begin_(sweep.X_WC_begin.translation().cast<float>()),
         end_(sweep.X_WC_end.translation().cast<float>()),
-        R_WC_begin_(sweep.X_WC_begin.rotation().cast<float>()),
-        R_WC_end_(sweep.X_WC_end.rotation().cast<float>()),
+        R_WC_begin_(sweep.X_WC_begin.R().cast<float>()),
+        R_WC_end_(sweep.X_WC_end.R().cast<float>()),
         exposure_part_(static_cast<float>(sweep.exposure_part)) {}
 
   void Render(int tile_u, int tile_v, LinearImage& image) {
@@ -144,18 +148,18 @@ class ImageRenderer::TileRenderer {
   }
 
  private:
-  /// Numbers of one sample's random draws.
-  enum Draw : std::uint64_t {
-    kPixelU,
-    kPixelV,
-    kTime,
-    kSunA,
-    kSunB,
-    kRoughX,
-    kRoughY,
-    kRoughZ,
-    kDraws
-  };
+  /// What a sample draws random numbers for.
+  enum Draw : std::uint64_t { kPlace, kSun, kMirror, kDraws };
+
+  /// Four numbers in [0, 1), independent of each other and of those of other draws.
+  [[nodiscard]] Eigen::Array4f Random(std::uint64_t sample_id, Draw draw) const {
+    const std::uint64_t bits = random_.Bits(sample_id * kDraws + draw);
+    constexpr float kUlp = 1.0F / 65536.0F;
+    const auto part = [bits](unsigned shift) {
+      return static_cast<float>(bits >> shift & 0xFFFFU) * kUlp;
+    };
+    return {part(0), part(16), part(32), part(48)};
+  }
 
   struct Sample {
     std::size_t pixel = 0;
@@ -170,10 +174,6 @@ class ImageRenderer::TileRenderer {
     float sun = 0.0F;   ///< Part of the sun's light that falls on it.
     float open = 1.0F;  ///< Part of the sky's light.
   };
-
-  [[nodiscard]] float Random(std::size_t sample, Draw draw) const {
-    return random_.Unit(samples_[sample].id * kDraws + draw);
-  }
 
   void CastCameraRays(int tile_u, int tile_v) {
     rays_.clear();
@@ -198,8 +198,8 @@ class ImageRenderer::TileRenderer {
         static_cast<std::size_t>(u);
     const std::uint64_t id =
         pixel * static_cast<std::uint64_t>(samples) + static_cast<std::uint64_t>(s);
-    const auto draw = [&](Draw which) { return random_.Unit(id * kDraws + which); };
-    Eigen::Vector2f offset(draw(kPixelU), draw(kPixelV));
+    const Eigen::Array4f random = Random(id, kPlace);
+    Eigen::Vector2f offset = random.head<2>();
     if (const int side = renderer_.grid_side_; s < side * side) {
       const Eigen::Vector2f cell(static_cast<float>(s % side), static_cast<float>(s / side));
       offset = (offset + cell) / static_cast<float>(side);
@@ -208,15 +208,14 @@ class ImageRenderer::TileRenderer {
     if (!through.allFinite()) return;  // Where the lens leads no light, the image stays black.
     const float row_part =
         static_cast<float>(v) / static_cast<float>(std::max(renderer_.height_ - 1, 1));
-    const float in_exposure = (static_cast<float>(s) + draw(kTime)) / static_cast<float>(samples);
+    const float in_exposure = (static_cast<float>(s) + random[2]) / static_cast<float>(samples);
     Ray ray;
     ray.time = (1.0F - exposure_part_) * row_part + exposure_part_ * in_exposure;
     ray.origin = begin_ + ray.time * (end_ - begin_);
-    // For turns of a few degrees, the normalised mean is as good as spherical interpolation.
-    Eigen::Quaternionf R_WC;
-    R_WC.coeffs() = R_WC_begin_.coeffs() + ray.time * (R_WC_end_.coeffs() - R_WC_begin_.coeffs());
-    ray.direction =
-        (R_WC.normalized() * Eigen::Vector3f(through.x(), through.y(), 1.0F)).normalized();
+    // For turns of a few degrees, as between two rows' exposures, this is as good as a rotation.
+    const Eigen::Vector3f p_C(through.x(), through.y(), 1.0F);
+    const Eigen::Vector3f begin = R_WC_begin_ * p_C;
+    ray.direction = (begin + ray.time * (R_WC_end_ * p_C - begin)).normalized();
     rays_.push_back(ray);
     samples_.push_back({.pixel = pixel, .id = id});
   }
@@ -316,8 +315,8 @@ class ImageRenderer::TileRenderer {
 
   void CastSunRay(const Group& group, std::size_t sample) {
     const Lighting& lighting = renderer_.lighting_;
-    const Eigen::Vector2f disk =
-        kSunRadius * UniformDisk(Random(sample, kSunA), Random(sample, kSunB));
+    const Eigen::Array4f random = Random(samples_[sample].id, kSun);
+    const Eigen::Vector2f disk = kSunRadius * UniformDisk(random[0], random[1]);
     Ray ray;
     ray.origin = Above(group, sample);
     if (IsLitFromBehind(group)) {
@@ -458,10 +457,8 @@ class ImageRenderer::TileRenderer {
     ray.direction = incoming - 2.0F * incoming.dot(surface.normal) * surface.normal;
     if (is_rough) {
       constexpr float kRoughness = 0.05F;
-      const Eigen::Vector3f off(Random(group.begin, kRoughX) - 0.5F,
-                                Random(group.begin, kRoughY) - 0.5F,
-                                Random(group.begin, kRoughZ) - 0.5F);
-      ray.direction += kRoughness * off;
+      const Eigen::Array4f random = Random(samples_[group.begin].id, kMirror) - 0.5F;
+      ray.direction += kRoughness * random.head<3>().matrix();
     }
     ray.direction.normalize();
     ray.time = rays_[group.begin].time;
@@ -488,8 +485,8 @@ class ImageRenderer::TileRenderer {
   CounterRandom random_;
   Eigen::Vector3f begin_;
   Eigen::Vector3f end_;
-  Eigen::Quaternionf R_WC_begin_;
-  Eigen::Quaternionf R_WC_end_;
+  Eigen::Matrix3f R_WC_begin_;
+  Eigen::Matrix3f R_WC_end_;
   float exposure_part_;
 
   // By sample of the tile, those of a pixel next to each other; kept between tiles so that nothing

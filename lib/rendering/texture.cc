@@ -5,8 +5,11 @@
 #include <bit>
 #include <cmath>
 
-#include <emmintrin.h>
 #include <fmt/format.h>
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 namespace relocd {
 namespace {
@@ -33,12 +36,19 @@ Eigen::Array4f Unpack(std::uint32_t texel) {
 
 /// The four bytes, each in [0, 255].
 Eigen::Array4f ToFloats(std::uint32_t texel) {
+#ifdef __SSE2__
   const __m128i zero = _mm_setzero_si128();
   const __m128i bytes = _mm_cvtsi32_si128(static_cast<int>(texel));
   const __m128i integers = _mm_unpacklo_epi16(_mm_unpacklo_epi8(bytes, zero), zero);
   Eigen::Array4f floats;
   _mm_storeu_ps(floats.data(), _mm_cvtepi32_ps(integers));
   return floats;
+#else
+  return {static_cast<float>(texel & 0xFFU),
+          static_cast<float>(texel >> 8U & 0xFFU),
+          static_cast<float>(texel >> 16U & 0xFFU),
+          static_cast<float>(texel >> 24U)};
+#endif
 }
 
 /// Linear light of sRGB in [0, 1], by a polynomial that is off by less than 0.003 (I. Taylor); the
@@ -168,6 +178,16 @@ Eigen::Array4f Texture::SampleLevel(const Level& level, float u, float v) {
                fx * ToFloats(texels[y1 * stride + x1]));
 }
 
+float Texture::AlphaNear(const Level& level, float u, float v) {
+  const auto x = static_cast<std::uint32_t>((u - std::floor(u)) * static_cast<float>(level.width));
+  const auto y = static_cast<std::uint32_t>((v - std::floor(v)) * static_cast<float>(level.height));
+  // Rounding may reach the first texel of the next repetition.
+  const std::uint32_t column = x & static_cast<std::uint32_t>(level.width - 1);
+  const std::uint32_t row = y & static_cast<std::uint32_t>(level.height - 1);
+  const std::uint32_t texel = level.texels[row * static_cast<std::uint32_t>(level.width) + column];
+  return static_cast<float>(texel >> 24U) / kByte;
+}
+
 Eigen::Array4f Texture::Sample(float u, float v, float footprint) const {
   const float level = LevelOf(footprint);
   const auto fine = static_cast<std::size_t>(level);
@@ -184,7 +204,7 @@ float Texture::SampleAlpha(float u, float v, float footprint) const {
   if (is_opaque_) return 1.0F;
   const auto level =
       std::min(static_cast<std::size_t>(LevelOf(footprint) + 0.5F), levels_.size() - 1);
-  return SampleLevel(levels_[level], u, v)[3] / kByte;
+  return AlphaNear(levels_[level], u, v);
 }
 
 }  // namespace relocd

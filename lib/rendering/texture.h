@@ -32,7 +32,7 @@ class Texture {
   /// @param footprint  length of what one sample stands for, as part of the texture's width.
   [[nodiscard]] Eigen::Array4f Sample(float u, float v, float footprint) const;
 
-  /// The coverage alone.
+  /// The coverage alone, of the nearest texel of the nearest mip level.
   [[nodiscard]] float SampleAlpha(float u, float v, float footprint) const;
 
   [[nodiscard]] int width() const { return levels_.front().width; }
@@ -51,6 +51,7 @@ class Texture {
   [[nodiscard]] float LevelOf(float footprint) const;
   /// sRGB and coverage, each in [0, 255]: between texels, sRGB is interpolated.
   static Eigen::Array4f SampleLevel(const Level& level, float u, float v);
+  static float AlphaNear(const Level& level, float u, float v);
 
   std::vector<Level> levels_;  ///< Each half as large as the one before, down to 1 x 1.
   bool is_opaque_ = true;
