@@ -16,8 +16,8 @@ constexpr double kWalkingSpeed_mps = 1.4;
 Eigen::Affine3f StandOnGround(const Ground& ground, const Pose2& X_WM, double length_m) {
   const Eigen::Vector2d ahead(std::cos(X_WM.yaw()), std::sin(X_WM.yaw()));
   const Eigen::Vector2d at = X_WM.translation();
-  const double front = ground.HeightAt(at + 0.5 * length_m * ahead);
-  const double rear = ground.HeightAt(at - 0.5 * length_m * ahead);
+  const double front = ground.HeightAlong(at + 0.5 * length_m * ahead, X_WM.yaw());
+  const double rear = ground.HeightAlong(at - 0.5 * length_m * ahead, X_WM.yaw());
   const double pitch = -std::atan2(front - rear, length_m);
   Eigen::Affine3d result = Eigen::Translation3d(at.x(), at.y(), 0.5 * (front + rear)) *
                            Eigen::AngleAxisd(X_WM.yaw(), Eigen::Vector3d::UnitZ()) *

@@ -163,15 +163,15 @@ std::size_t TorcsGround::NearestStation(const Eigen::Vector2d& p) const {
   return nearest;
 }
 
-std::size_t TorcsGround::StationNear(const Eigen::Vector2d& p, double z) const {
-  // Stations of one part of the road differ little in height here.
-  constexpr double kSamePartM = 1.0;
-  const double radius = 0.5 * width_ + 3.0;
+template <typename Difference>
+std::size_t TorcsGround::NearestFitting(const Eigen::Vector2d& p,
+                                        const Difference& difference,
+                                        double hardly) const {
   const std::size_t nearest = NearestStation(p);
-  const double nearest_step = std::abs(PlaneOf(nearest, p) - z);
-  if (nearest_step <= kSamePartM) return nearest;
+  double least = difference(nearest);
+  if (least <= hardly) return nearest;
+  const double radius = 0.5 * width_ + 3.0;
   std::vector<std::size_t> near;
-  double best_step = nearest_step;
   const Eigen::Vector2i first = station_grid_.CellOf(p - Eigen::Vector2d::Constant(radius));
   const Eigen::Vector2i last = station_grid_.CellOf(p + Eigen::Vector2d::Constant(radius));
   for (int y = first.y(); y <= last.y(); ++y) {
@@ -179,7 +179,7 @@ std::size_t TorcsGround::StationNear(const Eigen::Vector2d& p, double z) const {
       for (const std::uint32_t i : station_grid_.ItemsOf({x, y})) {
         if ((stations_[i].p_T - p).norm() > radius) continue;
         near.push_back(i);
-        best_step = std::min(best_step, std::abs(PlaneOf(i, p) - z));
+        least = std::min(least, difference(i));
       }
     }
   }
@@ -187,7 +187,7 @@ std::size_t TorcsGround::StationNear(const Eigen::Vector2d& p, double z) const {
   double best_distance = std::numeric_limits<double>::infinity();
   for (const std::size_t i : near) {
     const double distance = (stations_[i].p_T - p).norm();
-    if (distance >= best_distance || std::abs(PlaneOf(i, p) - z) > best_step + kSamePartM) continue;
+    if (distance >= best_distance || difference(i) > least + hardly) continue;
     best = i;
     best_distance = distance;
   }
@@ -240,8 +240,13 @@ double TorcsGround::HeightAt(const Eigen::Vector2d& p_W) const {
   return SmoothHeight(p_W, DescribedHeightAt(p_W));
 }
 
-double TorcsGround::HeightNear(const Eigen::Vector2d& p_W, double z_W) const {
-  return SmoothHeight(p_W, PlaneOf(StationNear(p_W, z_W), p_W));
+double TorcsGround::HeightAlong(const Eigen::Vector2d& p_W, double heading_W_rad) const {
+  // Of two lines, from 0 for parallel ones to 1 for a right angle.
+  const auto angle_to = [&](std::size_t station) {
+    return std::abs(std::sin(stations_[station].yaw_T_rad - heading_W_rad));
+  };
+  constexpr double kSamePart = 0.4;
+  return SmoothHeight(p_W, PlaneOf(NearestFitting(p_W, angle_to, kSamePart), p_W));
 }
 
 double TorcsGround::DescribedHeightAt(const Eigen::Vector2d& p_W) const {
@@ -250,10 +255,13 @@ double TorcsGround::DescribedHeightAt(const Eigen::Vector2d& p_W) const {
 
 bool TorcsGround::IsOnRoad(const Eigen::Vector3d& p_W, double margin_m) const {
   constexpr double kHeightM = 0.5;
-  const std::size_t station = StationNear(p_W.head<2>(), p_W.z());
+  const auto step_to = [&](std::size_t station) {
+    return std::abs(PlaneOf(station, p_W.head<2>()) - p_W.z());
+  };
+  const std::size_t station = NearestFitting(p_W.head<2>(), step_to, kHeightM);
   // Stations are at most 1 m apart along the road.
   return (stations_[station].p_T - p_W.head<2>()).norm() <= 0.5 * width_ + margin_m + 0.5 &&
-         std::abs(PlaneOf(station, p_W.head<2>()) - p_W.z()) <= kHeightM;
+         step_to(station) <= kHeightM;
 }
 
 }  // namespace relocd

@@ -31,7 +31,7 @@ class TorcsGround final : public Ground {
                                                            std::span<const Triangle> triangles_W);
 
   [[nodiscard]] double HeightAt(const Eigen::Vector2d& p_W) const override;
-  [[nodiscard]] double HeightNear(const Eigen::Vector2d& p_W, double z_W) const override;
+  [[nodiscard]] double HeightAlong(const Eigen::Vector2d& p_W, double heading_W_rad) const override;
 
   /// Where the road as described has its surface, near `p_W`: the plane of the nearest station.
   [[nodiscard]] double DescribedHeightAt(const Eigen::Vector2d& p_W) const;
@@ -59,7 +59,11 @@ class TorcsGround final : public Ground {
   [[nodiscard]] static Grid MakeGrid(const std::vector<TorcsStation>& stations, double cell_m);
   [[nodiscard]] Result<void> AddTriangles(std::span<const Triangle> triangles_W);
   [[nodiscard]] std::size_t NearestStation(const Eigen::Vector2d& p) const;
-  [[nodiscard]] std::size_t StationNear(const Eigen::Vector2d& p, double z) const;
+  /// Of those nearby, the nearest for which `difference` is hardly more than the least.
+  template <typename Difference>
+  [[nodiscard]] std::size_t NearestFitting(const Eigen::Vector2d& p,
+                                           const Difference& difference,
+                                           double hardly) const;
   [[nodiscard]] double PlaneOf(std::size_t station, const Eigen::Vector2d& p) const;
   /// The height nearest to `z` of a triangle at `p`; NaN where there is none.
   [[nodiscard]] double MeshHeight(const Eigen::Vector2d& p, double z) const;

@@ -102,8 +102,12 @@ class SceneBuilder {
       if (auto ok = AddObject(i); !ok) return ok.error();
     }
     SeparateCoincident();
-    const std::uint32_t mesh = scene_.AddMesh(std::move(mesh_));
-    scene_.instances.push_back({.mesh = mesh});
+    for (const bool with_holes : {false, true}) {
+      Mesh part = Part(with_holes);
+      if (part.triangles.empty()) continue;
+      const std::uint32_t mesh = scene_.AddMesh(std::move(part));
+      scene_.instances.push_back({.mesh = mesh});
+    }
     return std::move(scene_);
   }
 
@@ -115,6 +119,7 @@ class SceneBuilder {
   Result<int> TextureOf(const Ac3dObject& object);
   std::uint32_t MaterialOf(const Ac3dObject& object, const MaterialKey& key);
   void SeparateCoincident();
+  [[nodiscard]] Mesh Part(bool with_holes) const;
 
   const Ac3dModel& model_;
   const TorcsSceneOptions& options_;
@@ -270,6 +275,24 @@ void SceneBuilder::SeparateCoincident() {
       }
     }
   }
+}
+
+/// What has holes is traced more slowly, and so is a mesh of its own. Triangles share no vertices.
+Mesh SceneBuilder::Part(bool with_holes) const {
+  Mesh part;
+  for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
+    const std::uint32_t material = mesh_.triangle_materials[i];
+    if ((scene_.materials[material].alpha_cutoff > 0.0F) != with_holes) continue;
+    const auto first = static_cast<std::uint32_t>(part.positions.size());
+    for (const std::uint32_t vertex : mesh_.triangles[i]) {
+      part.positions.push_back(mesh_.positions[vertex]);
+      part.normals.push_back(mesh_.normals[vertex]);
+      part.uvs.push_back(mesh_.uvs[vertex]);
+    }
+    part.triangles.push_back({first, first + 1, first + 2});
+    part.triangle_materials.push_back(material);
+  }
+  return part;
 }
 
 }  // namespace

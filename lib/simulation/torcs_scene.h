@@ -25,9 +25,9 @@ struct TorcsSceneOptions {
   std::function<bool(const Eigen::Vector3f& p_W)> is_road;
 };
 
-/// Makes a scene of a track's mesh: one mesh with all surfaces, a material for each texture and
-/// plain colour, on and off the road. Where textures have holes so have surfaces. Surfaces that
-/// coincide are moved 5 mm apart, to where each is seen from.
+/// Makes a scene of a track's mesh: one mesh with all whole surfaces, one with those that have
+/// holes, as their textures have; a material for each texture and plain colour, on and off the
+/// road. Surfaces that coincide are moved 5 mm apart, to where each is seen from.
 ///
 /// @param path  of the model, for error messages.
 /// @return kInvalidInput for a texture that is missing or damaged, naming it, the object that asks

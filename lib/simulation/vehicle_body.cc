@@ -75,7 +75,7 @@ Pose3 VehicleBody::At(std::int64_t time_ns) const {
   std::array<double, 4> heights_m{};
   const std::array<Eigen::Vector2d, 4> wheels = geometry_.WheelsInBody();
   for (std::size_t i = 0; i < wheels.size(); ++i)
-    heights_m.at(i) = ground_.HeightAt(state.X_WB * wheels.at(i));
+    heights_m.at(i) = ground_.HeightAlong(state.X_WB * wheels.at(i), state.X_WB.yaw());
   const double rear_m = 0.5 * (heights_m[0] + heights_m[1]);
   const double front_m = 0.5 * (heights_m[2] + heights_m[3]);
   const double left_m = 0.5 * (heights_m[0] + heights_m[2]);

@@ -27,14 +27,14 @@ class WheelsOnGround {
         p_BKs_(geometry.WheelsInBody()),
         state_(plan.At(0)) {
     for (std::size_t i = 0; i < kWheels; ++i)
-      heights_m_.at(i) = ground_.HeightAt(state_.X_WB * p_BKs_.at(i));
+      heights_m_.at(i) = ground_.HeightAlong(state_.X_WB * p_BKs_.at(i), state_.X_WB.yaw());
   }
 
   void RollTo(std::int64_t time_ns) {
     const DrivePlan::State next = plan_.At(time_ns);
     for (std::size_t i = 0; i < kWheels; ++i) {
       const double plane_m = PlaneTravel(p_BKs_.at(i), next);
-      const double height_m = ground_.HeightAt(next.X_WB * p_BKs_.at(i));
+      const double height_m = ground_.HeightAlong(next.X_WB * p_BKs_.at(i), next.X_WB.yaw());
       travel_m_.at(i) += std::copysign(std::hypot(plane_m, height_m - heights_m_.at(i)), plane_m);
       heights_m_.at(i) = height_m;
     }

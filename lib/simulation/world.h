@@ -26,9 +26,10 @@ class Ground {
   /// z in W, m, below or above any point of the plane.
   [[nodiscard]] virtual double HeightAt(const Eigen::Vector2d& p_W) const = 0;
 
-  /// The same of the surface nearest to `z_W`, for what drives over and under bridges: the height
-  /// a moment before says on which of them it is.
-  [[nodiscard]] virtual double HeightNear(const Eigen::Vector2d& p_W, double /*z_W*/) const {
+  /// The same below something that heads so, forwards or backwards: where a road crosses itself,
+  /// its direction tells the bridge from what runs below it.
+  [[nodiscard]] virtual double HeightAlong(const Eigen::Vector2d& p_W,
+                                           double /*heading_W_rad*/) const {
     return HeightAt(p_W);
   }
 };

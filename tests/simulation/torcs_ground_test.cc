@@ -86,15 +86,18 @@ std::shared_ptr<const TorcsGround> MakeGround(const std::vector<TorcsStation>& s
   return TorcsGround::Create(stations, kWidth, triangles).value();
 }
 
-TEST(TorcsGround, TellsBridgesByTheHeightBefore) {
+TEST(TorcsGround, TellsBridgesByTheHeading) {
   const auto stations = Eight::Stations();
   const auto ground = MakeGround(stations, Eight::Triangles(stations));
-  double z = 6.0;
+  TestRandom random(3);
   for (int i = 0; i < 4000; ++i) {
     const double t = 2.0 * std::numbers::pi * i / 4000.0;
     const Eigen::Vector3d p = Eight::Middle(t);
-    z = ground->HeightNear(p.head<2>(), z);
-    ASSERT_NEAR(z, p.z(), 0.06) << t;
+    const Eigen::Vector3d ahead = Eight::Middle(t + 1e-4) - p;
+    const double heading = std::atan2(ahead.y(), ahead.x()) + random.Uniform(-0.1, 0.1);
+    ASSERT_NEAR(ground->HeightAlong(p.head<2>(), heading), p.z(), 0.06) << t;
+    const double backwards = heading + std::numbers::pi;
+    ASSERT_NEAR(ground->HeightAlong(p.head<2>(), backwards), p.z(), 0.06) << t;
   }
   const double crossing = ground->HeightAt({0.0, 0.0});
   EXPECT_TRUE(std::abs(crossing) < 0.06 || std::abs(crossing - 6.0) < 0.06) << crossing;
@@ -150,7 +153,7 @@ TEST(TorcsGround, GoesOnAsDescribedWhereThereIsNoMesh) {
   EXPECT_NEAR(ground->HeightAt({0.0, 0.0}), 2.0, 1e-9);
   EXPECT_NEAR(ground->HeightAt({0.0, 2.0}), 2.2, 1e-9);
   EXPECT_TRUE(std::isfinite(ground->HeightAt({1e6, -1e6})));
-  EXPECT_TRUE(std::isfinite(ground->HeightNear({-1e6, 1e6}, 5.0)));
+  EXPECT_TRUE(std::isfinite(ground->HeightAlong({-1e6, 1e6}, 5.0)));
 }
 
 TEST(TorcsGround, KnowsItsRoad) {

@@ -9,6 +9,7 @@
 namespace relocd {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 /// An object with one triangle in the plane z = 0 of W, seen from above, or from below.
@@ -85,6 +86,9 @@ TEST_F(MakeTorcsSceneTest, CutsHolesAndKeepsPlainColours) {
   EXPECT_NEAR(scene->materials[1].albedo[0], 1.0F, 1e-6);
   EXPECT_NEAR(scene->materials[1].albedo[2], LinearFromSrgb(128), 1e-6);
   EXPECT_EQ(scene->materials[2].alpha_cutoff, 0.0F);
+  ASSERT_EQ(scene->meshes.size(), 2U);
+  EXPECT_THAT(scene->meshes[0].triangle_materials, ElementsAre(1U, 2U));
+  EXPECT_THAT(scene->meshes[1].triangle_materials, ElementsAre(0U));
 }
 
 TEST_F(MakeTorcsSceneTest, LetsTheRoadShineWhenWet) {
