@@ -202,7 +202,7 @@ void DrawAxes(Canvas& canvas,
               const std::string& x_label,
               const std::string& y_label) {
   constexpr double kTickDistance = 90.0;
-  constexpr double kRowDistance = 60.0;
+  constexpr double kRowDistance = 45.0;
   constexpr double kGap = 8.0;
   const cv::Rect2d& box = panel.box;
   const cv::Scalar& grid = canvas.theme().grid;

@@ -82,7 +82,7 @@ ErrorSeries HeadingSeries(const ReportRow& row) {
 /// press the others to the ground.
 double HighestShown(const ErrorSeries& fused, const ErrorSeries& camera, double least) {
   constexpr double kRoom = 1.15;
-  constexpr double kMostOverP95 = 4.0;
+  constexpr double kMostOverP95 = 3.0;
   double highest = least;
   for (const ErrorSeries* series : {&fused, &camera}) {
     std::vector<double> errors;

@@ -163,8 +163,41 @@ struct Strokes {
   double truth = 5.0;
   double odometry = 1.3;
   double fused = 1.5;
-  double dot = 2.0;
+  double dot = 1.4;
+  double outlier = 2.6;
 };
+
+/// Those that are no outliers.
+void DrawCamera(Canvas& canvas,
+                const Panel& panel,
+                const DriveReport& report,
+                const cv::Scalar& colour,
+                double radius) {
+  if (!report.camera.evaluation) return;
+  const std::vector<PosePair>& pairs = report.camera.evaluation->pairs;
+  const std::vector<double> errors = PositionErrors(pairs);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (errors[i] > kOutlierM) continue;
+    canvas.Dot(panel.Pixel(Position(pairs[i].X_WB)), radius, colour);
+  }
+}
+
+/// Joined to the truth, so that none is hidden.
+void DrawOutliers(Canvas& canvas,
+                  const Panel& panel,
+                  const DriveReport& report,
+                  const cv::Scalar& colour,
+                  double radius) {
+  if (!report.camera.evaluation) return;
+  const std::vector<PosePair>& pairs = report.camera.evaluation->pairs;
+  const std::vector<double> errors = PositionErrors(pairs);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (errors[i] <= kOutlierM) continue;
+    const cv::Point2d point = panel.Pixel(Position(pairs[i].X_WB));
+    canvas.Line(panel.Pixel(Position(pairs[i].X_WB_true)), point, colour, 0.8);
+    canvas.Dot(point, radius, colour);
+  }
+}
 
 void DrawWays(Canvas& canvas,
               const Panel& panel,
@@ -178,29 +211,10 @@ void DrawWays(Canvas& canvas,
       strokes.truth);
   canvas.Polyline(
       Way(panel, report.odometry.evaluation->pairs, estimated), colours.odometry, strokes.odometry);
+  DrawCamera(canvas, panel, report, colours.camera, strokes.dot);
   canvas.Polyline(
       Way(panel, report.fused.evaluation->pairs, estimated), colours.fused, strokes.fused);
-}
-
-/// Outliers last and joined to the truth, so that none is hidden.
-void DrawCamera(Canvas& canvas,
-                const Panel& panel,
-                const DriveReport& report,
-                const ReportColours& colours,
-                double radius) {
-  if (!report.camera.evaluation) return;
-  const std::vector<PosePair>& pairs = report.camera.evaluation->pairs;
-  const std::vector<double> errors = PositionErrors(pairs);
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (errors[i] > kOutlierM) continue;
-    canvas.Dot(panel.Pixel(Position(pairs[i].X_WB)), radius, colours.camera);
-  }
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (errors[i] <= kOutlierM) continue;
-    const cv::Point2d point = panel.Pixel(Position(pairs[i].X_WB));
-    canvas.Line(panel.Pixel(Position(pairs[i].X_WB_true)), point, colours.outlier, 0.8);
-    canvas.Dot(point, radius + 0.6, colours.outlier);
-  }
+  DrawOutliers(canvas, panel, report, colours.outlier, strokes.outlier);
 }
 
 /// Goes along a line and begins a new one where an entry does not fit any more.
@@ -260,13 +274,13 @@ void DrawLegend(Canvas& canvas,
   const Strokes strokes;
   legend.Add("truth", line(colours.truth, strokes.truth));
   legend.Add("odometry alone", line(colours.odometry, strokes.odometry));
-  legend.Add("camera alone", dot(colours.camera, strokes.dot + 0.6));
+  legend.Add("camera alone", dot(colours.camera, strokes.dot + 1.0));
   if (report.camera.outliers > 0) {
     const std::size_t hidden = HiddenOutliers(panel, report);
     std::string text =
         fmt::format("{} camera poses off by > {:g} m", report.camera.outliers, kOutlierM);
     if (hidden > 0) text += fmt::format(" ({} beyond the view)", hidden);
-    legend.Add(text, dot(colours.outlier, strokes.dot + 1.0));
+    legend.Add(text, dot(colours.outlier, strokes.outlier));
   }
   legend.Add("fused", line(colours.fused, strokes.fused + 0.5));
   if (ellipses.every_m <= 0.0) return;
@@ -335,16 +349,21 @@ std::array<Place, 2> ChoosePlaces(const DriveReport& report) {
   const std::vector<double> errors = PositionErrors(report.fused.evaluation->pairs);
   const auto largest = std::ranges::max_element(errors);
   const double median = report.fused.position_m.median;
-  // Of the places with about the median error the one in the middle of the drive: a typical one.
-  std::vector<std::size_t> typical;
+  const auto largest_at = static_cast<std::size_t>(largest - errors.begin());
+  // Of the places with about the median error one in the middle of the half that A is not in.
+  constexpr double kAbout = 0.1;
+  const std::size_t quarter = errors.size() / 4;
+  const std::size_t wanted = largest_at < errors.size() / 2 ? 3 * quarter : quarter;
+  const auto apart = [wanted](std::size_t i) { return i > wanted ? i - wanted : wanted - i; };
+  std::size_t typical = wanted;
+  std::size_t least_apart = errors.size();
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    if (std::abs(errors[i] - median) <= 0.1 * median) typical.push_back(i);
+    if (std::abs(errors[i] - median) > kAbout * median || apart(i) >= least_apart) continue;
+    typical = i;
+    least_apart = apart(i);
   }
-  const std::size_t middle = typical.empty() ? errors.size() / 2 : typical[typical.size() / 2];
-  return {Place{.letter = "A",
-                .what = "largest error",
-                .index = static_cast<std::size_t>(largest - errors.begin())},
-          Place{.letter = "B", .what = "a typical place", .index = middle}};
+  return {Place{.letter = "A", .what = "largest error", .index = largest_at},
+          Place{.letter = "B", .what = "a typical place", .index = typical}};
 }
 
 /// Around the fused and the true position, wide enough for the error and its ellipse.
@@ -384,8 +403,11 @@ void DrawNear(Canvas& canvas,
       canvas.Translucent(kOpacity, [&] { canvas.Polygon(ellipse, colours.fused); });
       canvas.Polyline(ellipse, colours.fused, 0.8);
     }
-    DrawWays(canvas, panel, report, colours, {.truth = 7.0, .odometry = 1.6, .fused = 2.0});
-    DrawCamera(canvas, panel, report, colours, 3.4);
+    DrawWays(canvas,
+             panel,
+             report,
+             colours,
+             {.truth = 7.0, .odometry = 1.6, .fused = 2.0, .dot = 3.2, .outlier = 3.8});
     const cv::Point2d truth = panel.Pixel(Position(pair.X_WB_true));
     const cv::Point2d fused = panel.Pixel(Position(pair.X_WB));
     canvas.Line(truth, fused, canvas.theme().ink, 1.4);
@@ -467,7 +489,6 @@ cv::Mat DrawDrive(const DriveReport& report, const TopView& top_view, const Figu
   canvas.Within(map.box, [&] {
     if (ellipses.every_m > 0.0) DrawEllipses(canvas, map, fused, ellipses, colours.fused);
     DrawWays(canvas, map, report, colours, {});
-    DrawCamera(canvas, map, report, colours, Strokes().dot);
     DrawPlaceMarks(canvas, map, report, places);
     DrawMarks(canvas, map, report);
     DrawScale(canvas, map);
