@@ -21,9 +21,9 @@ void MeshBuilder::AddQuad(const Eigen::Vector3f& corner,
 void MeshBuilder::AddPicture(const Eigen::Vector3f& corner,
                              const Eigen::Vector3f& edge_u,
                              const Eigen::Vector3f& edge_v,
-                             std::uint32_t material) {
-  AddQuadWithUvs(
-      corner, edge_u, edge_v, Eigen::Vector2f::Zero(), Eigen::Vector2f::Ones(), material);
+                             std::uint32_t material,
+                             const PicturePart& part) {
+  AddQuadWithUvs(corner, edge_u, edge_v, part.low, part.high, material);
 }
 
 void MeshBuilder::AddQuadWithUvs(const Eigen::Vector3f& corner,

@@ -10,6 +10,12 @@
 
 namespace relocd {
 
+/// A part of a picture: u to the right and v up from its lower left corner, each in [0, 1].
+struct PicturePart {
+  Eigen::Vector2f low = Eigen::Vector2f::Zero();
+  Eigen::Vector2f high = Eigen::Vector2f::Ones();
+};
+
 /// Puts a mesh together from simple shapes. Vertices are not shared between shapes, so that edges
 /// are sharp. Colours come from materials; texture coordinates are metres divided by `tile_m`, so
 /// that a texture keeps its scale on walls of all sizes.
@@ -28,11 +34,12 @@ class MeshBuilder {
                float tile_m = 1.0F,
                const Eigen::Vector2f& uv_origin = Eigen::Vector2f::Zero());
 
-  /// The same with the whole texture stretched over it once.
+  /// The same with the whole texture, or a part of it, stretched over it once.
   void AddPicture(const Eigen::Vector3f& corner,
                   const Eigen::Vector3f& edge_u,
                   const Eigen::Vector3f& edge_v,
-                  std::uint32_t material);
+                  std::uint32_t material,
+                  const PicturePart& part = {});
 
   /// A box with sides along the axes of `X_MB`, from `low` to `high`.
   void AddBox(const Eigen::Vector3f& low,
