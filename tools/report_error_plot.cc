@@ -78,13 +78,20 @@ ErrorSeries HeadingSeries(const ReportRow& row) {
   return series;
 }
 
+/// What one panel shows.
+struct ErrorPair {
+  ErrorSeries fused;
+  ErrorSeries camera;
+  double outlier = std::numeric_limits<double>::infinity();  ///< The camera's in another colour.
+};
+
 /// The largest error that the panel must show: all of the fused ones, but no outlier that would
 /// press the others to the ground.
-double HighestShown(const ErrorSeries& fused, const ErrorSeries& camera, double least) {
+double HighestShown(const ErrorPair& pair, double least) {
   constexpr double kRoom = 1.15;
   constexpr double kMostOverP95 = 3.0;
   double highest = least;
-  for (const ErrorSeries* series : {&fused, &camera}) {
+  for (const ErrorSeries* series : {&pair.fused, &pair.camera}) {
     std::vector<double> errors;
     for (const ErrorSample& sample : *series)
       errors.push_back(std::abs(sample.error));
@@ -92,6 +99,15 @@ double HighestShown(const ErrorSeries& fused, const ErrorSeries& camera, double 
     highest = std::max(highest, std::min(kRoom * summary.max, kMostOverP95 * summary.p95));
   }
   return highest;
+}
+
+/// From where LOCALIZATION began to speak, with a pose or without.
+Range TimeAxis(const DriveReport& report, const ErrorSeries& fused) {
+  constexpr double kShortestS = 1e-3;
+  const double begin_s = report.status_spans.empty()
+                             ? fused.front().time_s
+                             : Seconds(report.status_spans.front().begin_ns);
+  return {.low = begin_s, .high = std::max(begin_s + kShortestS, fused.back().time_s)};
 }
 
 void DrawBand(Canvas& canvas,
@@ -162,14 +178,12 @@ void DrawSeries(Canvas& canvas,
 
 void DrawPanel(Canvas& canvas,
                const Panel& panel,
-               const ErrorSeries& fused,
-               const ErrorSeries& camera,
-               const ReportColours& colours,
-               double outlier) {
+               const ErrorPair& errors,
+               const ReportColours& colours) {
   canvas.Within(panel.box, [&] {
-    DrawBand(canvas, panel, fused, colours.fused);
-    DrawCameraErrors(canvas, panel, camera, colours, outlier);
-    DrawSeries(canvas, panel, fused, colours.fused);
+    DrawBand(canvas, panel, errors.fused, colours.fused);
+    DrawCameraErrors(canvas, panel, errors.camera, colours, errors.outlier);
+    DrawSeries(canvas, panel, errors.fused, colours.fused);
   });
 }
 
@@ -222,24 +236,18 @@ void DrawStatuses(Canvas& canvas,
 
 cv::Mat DrawErrors(const DriveReport& report, const FigureStyle& style) {
   Canvas canvas(kWidth, kHeight, style.theme, kPixelsPerUnit);
-  const ErrorSeries fused_position = PositionSeries(report.fused);
-  const ErrorSeries fused_heading = HeadingSeries(report.fused);
-  const ErrorSeries camera_position = PositionSeries(report.camera);
-  const ErrorSeries camera_heading = HeadingSeries(report.camera);
+  const ErrorPair positions{.fused = PositionSeries(report.fused),
+                            .camera = PositionSeries(report.camera),
+                            .outlier = kOutlierM};
+  const ErrorPair headings{.fused = HeadingSeries(report.fused),
+                           .camera = HeadingSeries(report.camera)};
   constexpr double kLeastPositionM = 0.05;
   constexpr double kLeastHeadingDeg = 0.2;
-  constexpr double kShortestS = 1e-3;
-  // From where LOCALIZATION began to speak, with a pose or without.
-  const double begin_s = report.status_spans.empty()
-                             ? fused_position.front().time_s
-                             : Seconds(report.status_spans.front().begin_ns);
-  const Range time{.low = begin_s,
-                   .high = std::max(begin_s + kShortestS, fused_position.back().time_s)};
-  const Panel position{
-      .box = {kLeft, kPositionTop, kPanelWidth, kPositionHeight},
-      .x = time,
-      .y = {.low = 0.0, .high = HighestShown(fused_position, camera_position, kLeastPositionM)}};
-  const double highest = HighestShown(fused_heading, camera_heading, kLeastHeadingDeg);
+  const Range time = TimeAxis(report, positions.fused);
+  const Panel position{.box = {kLeft, kPositionTop, kPanelWidth, kPositionHeight},
+                       .x = time,
+                       .y = {.low = 0.0, .high = HighestShown(positions, kLeastPositionM)}};
+  const double highest = HighestShown(headings, kLeastHeadingDeg);
   const Panel heading{.box = {kLeft, kHeadingTop, kPanelWidth, kHeadingHeight},
                       .x = time,
                       .y = {.low = -highest, .high = highest}};
@@ -249,14 +257,9 @@ cv::Mat DrawErrors(const DriveReport& report, const FigureStyle& style) {
            position,
            "time [s]",
            "position error [m]: line fused, shaded its 3 sigma; dots camera, dashes its 3 sigma");
-  DrawPanel(canvas, position, fused_position, camera_position, style.colours, kOutlierM);
+  DrawPanel(canvas, position, positions, style.colours);
   DrawAxes(canvas, heading, "time [s]", "heading error [deg], + is to the left");
-  DrawPanel(canvas,
-            heading,
-            fused_heading,
-            camera_heading,
-            style.colours,
-            std::numeric_limits<double>::infinity());
+  DrawPanel(canvas, heading, headings, style.colours);
   return canvas.Finish();
 }
 

@@ -12,6 +12,27 @@ namespace {
 
 constexpr double kPercent = 100.0;
 
+void AppendHeader(std::string& text) {
+  fmt::format_to(
+      std::back_inserter(text),
+      "{:<36}{:>7}{:>28}{:>42}\n{:<36}{:>7}{:>8}{:>8}{:>8}{:>8}{:>8}  {:>8}{:>8}{:>8}{:>8}\n",
+      "",
+      "",
+      "position error [m]",
+      "heading error [deg]    off by",
+      "",
+      "poses",
+      "mean",
+      "RMSE",
+      "median",
+      "p95",
+      "max",
+      "mean",
+      "RMSE",
+      "max",
+      "> 1 m");
+}
+
 void AppendRow(const ReportRow& row, std::string& text) {
   if (!row.evaluation) {
     fmt::format_to(std::back_inserter(text), "{:<36}{:>7}  no pose to compare\n", row.name, 0);
@@ -138,24 +159,7 @@ std::string DescribeImages(const DriveReport& report) {
 std::string FormatReportText(const DriveReport& report) {
   std::string text = fmt::format(
       "{}\n{}\ntruth: {}\n\n", report.title, DescribeOutcome(report), report.truth_path);
-  fmt::format_to(
-      std::back_inserter(text),
-      "{:<36}{:>7}{:>28}{:>42}\n{:<36}{:>7}{:>8}{:>8}{:>8}{:>8}{:>8}  {:>8}{:>8}{:>8}{:>8}\n",
-      "",
-      "",
-      "position error [m]",
-      "heading error [deg]    off by",
-      "",
-      "poses",
-      "mean",
-      "RMSE",
-      "median",
-      "p95",
-      "max",
-      "mean",
-      "RMSE",
-      "max",
-      "> 1 m");
+  AppendHeader(text);
   for (const ReportRow* row : report.rows())
     AppendRow(*row, text);
   fmt::format_to(std::back_inserter(text),
