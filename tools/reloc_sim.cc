@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   relocd::SimCommand command;
   relocd::AddSimWheels(app, command);
+  relocd::AddSimView(app, command);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

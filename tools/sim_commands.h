@@ -17,4 +17,7 @@ using SimCommand = std::function<Result<void>()>;
 /// `wheels`: the CAN frames of the wheels along a trajectory from a file.
 void AddSimWheels(CLI::App& app, SimCommand& command);
 
+/// `view`: one picture of a world, from the road or from above.
+void AddSimView(CLI::App& app, SimCommand& command);
+
 }  // namespace relocd

@@ -61,6 +61,9 @@ struct World {
   std::vector<std::uint32_t> pedestrian_meshes;
 };
 
+/// All that MakeWorld knows by name on this machine.
+std::vector<std::string> WorldNames();
+
 /// A world by name: `campus`, or `torcs:TRACK` (as in torcs:aalborg) of Debian's torcs-data, or
 /// `torcs:FOLDER` with a slash, a folder that has a track.
 ///
