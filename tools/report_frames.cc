@@ -51,8 +51,10 @@ std::vector<std::size_t> EvenlySpaced(std::size_t size, std::size_t count) {
   return indices;
 }
 
+/// Whether an image was taken while images were worked on.
 bool IsDuringDrive(std::int64_t time_ns, const DriveReport& report) {
-  return time_ns >= report.truths.front().time_ns && time_ns <= report.truths.back().time_ns;
+  return time_ns >= report.camera_rows.front().time_ns &&
+         time_ns <= report.camera_rows.back().time_ns;
 }
 
 /// The entry that is nearest in time; nothing when it is further than `most_ns` away.

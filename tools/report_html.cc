@@ -268,13 +268,16 @@ void AppendFrame(const ReportFrame& frame, std::string& html) {
   if (frame.teach_jpeg.empty()) {
     html += image;
   } else {
-    fmt::format_to(
-        std::back_inserter(html),
-        "<div class=\"two\"><div><em>teach, {:.1f} m away</em><img alt=\"the teach drive "
-        "here\" src=\"{}\"></div><div><em>this drive</em>{}</div></div>",
-        frame.teach_distance_m,
-        DataUri("image/jpeg", frame.teach_jpeg),
-        image);
+    constexpr double kSamePlaceM = 0.05;
+    const std::string where = frame.teach_distance_m < kSamePlaceM
+                                  ? std::string("teach")
+                                  : fmt::format("teach, {:.1f} m away", frame.teach_distance_m);
+    fmt::format_to(std::back_inserter(html),
+                   "<div class=\"two\"><div><em>{}</em><img alt=\"the teach drive here\" "
+                   "src=\"{}\"></div><div><em>this drive</em>{}</div></div>",
+                   where,
+                   DataUri("image/jpeg", frame.teach_jpeg),
+                   image);
   }
   fmt::format_to(std::back_inserter(html),
                  "<figcaption><b>{:.1f} s</b> · {}",
