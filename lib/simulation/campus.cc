@@ -5,9 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "simulation/campus_cars.h"
 #include "simulation/campus_furniture.h"
 #include "simulation/campus_ground.h"
 #include "simulation/campus_materials.h"
+#include "simulation/campus_people.h"
 #include "simulation/campus_plants.h"
 #include "simulation/campus_random.h"
 #include "simulation/campus_road_marks.h"
@@ -72,6 +74,8 @@ Result<World> MakeCampus(std::uint64_t seed) {
   CampusSite site(*ground, network, world.scene);
   AddBuildings(stock, part(TownPart::kBuildings), site);
   AddScenery(stock, part(TownPart::kScenery), site);
+  world.car_meshes = AddCarMeshes(stock.materials, part(TownPart::kCars), world.scene);
+  world.pedestrian_meshes = AddPeopleMeshes(stock.materials, part(TownPart::kPeople), world.scene);
   if (auto ok = world.scene.Validate(); !ok) return ok.error();
   return world;
 }

@@ -183,6 +183,20 @@ void AddPictureMaterials(const TileNoise& noise,
   m.plates = AddCutOut("plates", AddTexture(MakePlates(random.Fork(36)), scene), 0.5F, scene);
 }
 
+void AddCarMaterials(CampusRandom random, Scene& scene, CampusMaterials& m) {
+  m.car_glass = Add("car glass", -1, 0.025F, scene);
+  scene.materials[m.car_glass].reflectivity = 0.08F;
+  m.dark_plastic =
+      AddTintedMaterial("dark plastic", m.plaster_texture, {0.17F, 0.17F, 0.18F}, scene);
+  m.rubber = Add("rubber", -1, 0.018F, scene);
+  m.head_light = Add("head light", -1, 0.65F, scene);
+  scene.materials[m.head_light].reflectivity = kGlassReflectivity;
+  m.tail_light = AddTintedMaterial("tail light", -1, {0.55F, 0.08F, 0.07F}, scene);
+  scene.materials[m.tail_light].reflectivity = kGlassReflectivity;
+  m.licence_plates =
+      Add("licence plates", AddTexture(MakeLicencePlates(random.Fork(41)), scene), 0.9F, scene);
+}
+
 }  // namespace
 
 std::uint32_t AddTintedMaterial(const std::string& name,
@@ -206,6 +220,7 @@ CampusMaterials MakeCampusMaterials(CampusRandom random, Scene& scene) {
   m.rusty_metal = AddTintedMaterial("rusty metal", m.metal_texture, {0.58F, 0.44F, 0.36F}, scene);
   for (const std::uint32_t material : {m.metal, m.dark_metal})
     scene.materials[material].reflectivity = 0.03F;
+  AddCarMaterials(random, scene, m);
   m.lamp_glow = Add("lamp glass", -1, 0.8F, scene);
   scene.materials[m.lamp_glow].emission = {9.0F, 7.2F, 4.6F};
   return m;

@@ -60,6 +60,14 @@ struct CampusMaterials {
   std::uint32_t hedge = 0;
   std::uint32_t grass_tuft = 0;
 
+  // Cars.
+  std::uint32_t car_glass = 0;
+  std::uint32_t dark_plastic = 0;
+  std::uint32_t rubber = 0;
+  std::uint32_t head_light = 0;
+  std::uint32_t tail_light = 0;
+  std::uint32_t licence_plates = 0;
+
   // Textures from which others are tinted.
   int plaster_texture = -1;
   int clapboard_texture = -1;

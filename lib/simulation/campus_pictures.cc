@@ -478,6 +478,26 @@ Texture MakePlates(CampusRandom random) {
   return canvas.ToTexture();
 }
 
+Texture MakeLicencePlates(CampusRandom random) {
+  Canvas canvas(256, 256, GreyPaint(0.85F));
+  for (int i = 0; i < kLicencePlates.size(); ++i) {
+    const Area area = AreaOf(canvas, kLicencePlates, i);
+    FillArea(canvas, area, GreyPaint(0.86F, 0.01F));
+    canvas.FillRectangle(area.low, area.At(0.09F, 1.0F), OpaquePaint(0.15F, 0.25F, 0.55F));
+    std::string text;
+    for (int k = 0; k < 2; ++k)
+      text += static_cast<char>('A' + random.Index(26));
+    text += '-';
+    text += std::to_string(100 + random.Index(900));
+    DrawTextWithin(text,
+                   area.At(0.14F, 0.2F),
+                   area.At(0.96F, 0.8F),
+                   {.height = 19.0F, .stroke = 3.0F},
+                   canvas);
+  }
+  return canvas.ToTexture();
+}
+
 Texture MakeRoadDetails(const TileNoise& noise) {
   Canvas canvas(256, 256, Paint(0.2F, 0.2F, 0.2F, 0.0F));
   DrawManhole(canvas, AreaOf(canvas, kRoadDetails, 0));

@@ -26,6 +26,8 @@ inline constexpr PictureGrid kPlates{4, 4};
 /// A manhole, a drain, an oil stain, a patch's outline.
 inline constexpr PictureGrid kRoadDetails{2, 2};
 
+inline constexpr PictureGrid kLicencePlates{2, 8};
+
 enum class TrafficSign {
   kStop,
   kGiveWay,
@@ -43,6 +45,7 @@ Texture MakeShopSigns(const TileNoise& noise, CampusRandom random);
 Texture MakePosters(const TileNoise& noise, CampusRandom random);
 Texture MakeDoorPictures(const TileNoise& noise, CampusRandom random);
 Texture MakePlates(CampusRandom random);
+Texture MakeLicencePlates(CampusRandom random);
 Texture MakeRoadDetails(const TileNoise& noise);
 Texture MakeCracks(CampusRandom random);
 /// Dirt that runs down a wall.
