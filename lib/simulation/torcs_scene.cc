@@ -112,12 +112,16 @@ class SceneBuilder {
   }
 
  private:
-  /// Texture (-1: none), material of the model, on the road.
-  using MaterialKey = std::tuple<int, std::uint32_t, bool>;
+  /// What rain does to a surface.
+  enum class Wetting { kNone, kDarker, kShining };
+  /// Texture (-1: none), material of the model.
+  using MaterialKey = std::tuple<int, std::uint32_t, Wetting>;
 
   Result<void> AddObject(std::size_t index);
   Result<int> TextureOf(const Ac3dObject& object);
   std::uint32_t MaterialOf(const Ac3dObject& object, const MaterialKey& key);
+  [[nodiscard]] Wetting WettingOf(const std::array<Eigen::Vector3f, 3>& p_Ws,
+                                  const Eigen::Vector3f& normal) const;
   void SeparateCoincident();
   [[nodiscard]] Mesh Part(bool with_holes) const;
 
@@ -169,9 +173,17 @@ bool HasWord(const std::string& text, std::initializer_list<const char*> words) 
   });
 }
 
+SceneBuilder::Wetting SceneBuilder::WettingOf(const std::array<Eigen::Vector3f, 3>& p_Ws,
+                                              const Eigen::Vector3f& normal) const {
+  constexpr float kSmallestUp = 0.7F;
+  if (std::abs(normal.z()) < kSmallestUp) return Wetting::kNone;
+  const bool is_road = options_.is_road && options_.is_road((p_Ws[0] + p_Ws[1] + p_Ws[2]) / 3.0F);
+  return is_road ? Wetting::kShining : Wetting::kDarker;
+}
+
 std::uint32_t SceneBuilder::MaterialOf(const Ac3dObject& object, const MaterialKey& key) {
   if (const auto known = materials_.find(key); known != materials_.end()) return known->second;
-  const auto& [texture, number, is_road] = key;
+  const auto& [texture, number, wetting] = key;
   Material material{.name = object.texture, .texture = texture};
   if (texture >= 0) {
     material.albedo = Eigen::Array3f::Constant(kWallReflectance);
@@ -187,11 +199,10 @@ std::uint32_t SceneBuilder::MaterialOf(const Ac3dObject& object, const MaterialK
           LinearFromSrgb(static_cast<std::uint8_t>(std::lround(255.0F * plain.colour[i])));
     }
   }
-  if (is_road) {
-    const bool is_loose = HasWord(object.texture, {"dirt", "sand", "grass", "gravel", "mud"});
-    material.wet_darkening = 0.4F;
-    material.wet_reflectivity = is_loose ? 0.01F : 0.04F;
-  }
+  if (wetting != Wetting::kNone) material.wet_darkening = 0.4F;
+  const bool is_loose =
+      HasWord(object.texture, {"dirt", "earth", "gras", "gravel", "mud", "sand", "snow"});
+  if (wetting == Wetting::kShining && !is_loose) material.wet_reflectivity = 0.04F;
   const std::uint32_t index = scene_.AddMaterial(std::move(material));
   materials_.emplace(key, index);
   return index;
@@ -226,10 +237,8 @@ Result<void> SceneBuilder::AddObject(std::size_t index) {
       const Eigen::Vector3f cross = (p_Ws[1] - p_Ws[0]).cross(p_Ws[2] - p_Ws[0]);
       if (!(cross.norm() > kSmallestAreaM2)) continue;
       const Eigen::Vector3f face = cross.normalized();
-      const bool is_road =
-          options_.is_road && options_.is_road((p_Ws[0] + p_Ws[1] + p_Ws[2]) / 3.0F);
-      const std::uint32_t material =
-          MaterialOf(object, {*texture, *texture >= 0 ? 0U : surface.material, is_road});
+      const std::uint32_t material = MaterialOf(
+          object, {*texture, *texture >= 0 ? 0U : surface.material, WettingOf(p_Ws, face)});
       const auto first = static_cast<std::uint32_t>(mesh_.positions.size());
       for (std::size_t i = 0; i < 3; ++i) {
         const Ac3dCorner& corner = surface.corners[triangle.at(i)];

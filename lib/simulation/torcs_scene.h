@@ -21,13 +21,14 @@ std::vector<std::array<Eigen::Vector3f, 3>> TrianglesInWorld(const Ac3dModel& mo
 
 struct TorcsSceneOptions {
   std::vector<std::string> texture_folders;  ///< In the order in which they are searched.
-  /// Whether a triangle with this middle is part of the road, which shines when it is wet.
+  /// Whether a level triangle with this middle is paved as the road is, and shines when it is wet,
+  /// unless its texture is called after sand, grass and the like.
   std::function<bool(const Eigen::Vector3f& p_W)> is_road;
 };
 
 /// Makes a scene of a track's mesh: one mesh with all whole surfaces, one with those that have
-/// holes, as their textures have; a material for each texture and plain colour, on and off the
-/// road. Surfaces that coincide are moved 5 mm apart, to where each is seen from.
+/// holes, as their textures have; a material for each texture and plain colour, and for what rain
+/// does to it. Surfaces that coincide are moved 5 mm apart, to where each is seen from.
 ///
 /// @param path  of the model, for error messages.
 /// @return kInvalidInput for a texture that is missing or damaged, naming it, the object that asks

@@ -100,10 +100,10 @@ Result<World> MakeWorldOf(const TorcsLayout& layout,
   const auto stations_W = StationsInWorld(layout.stations, *p_WT);
   auto ground = TorcsGround::Create(stations_W, layout.width_m, TrianglesInWorld(model));
   if (!ground) return std::move(ground).error().WithContext(mesh_path);
-  constexpr double kMarginM = 0.5;
+  constexpr double kPavedM = 10.0;  // beside the road: pit lanes, and what TORCS calls sides
   const TorcsSceneOptions options{.texture_folders = texture_folders,
                                   .is_road = [&](const Eigen::Vector3f& p_W) {
-                                    return (*ground)->IsOnRoad(p_W.cast<double>(), kMarginM);
+                                    return (*ground)->IsOnRoad(p_W.cast<double>(), kPavedM);
                                   }};
   auto scene = MakeTorcsScene(model, options, mesh_path);
   if (!scene) return std::move(scene).error();

@@ -1,5 +1,7 @@
 #include "simulation/torcs_scene.h"
 
+#include <tuple>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -93,17 +95,26 @@ TEST_F(MakeTorcsSceneTest, CutsHolesAndKeepsPlainColours) {
 
 TEST_F(MakeTorcsSceneTest, LetsTheRoadShineWhenWet) {
   options_.is_road = [](const Eigen::Vector3f& p_W) { return p_W.z() < 1.0F; };
+  const std::string wall =
+      "OBJECT poly\nnumvert 3\n0 0 0\n1 0 0\n0 1 0\nnumsurf 1\nSURF 0x00\nmat 0\nrefs 3\n0 0 0\n"
+      "1 0 0\n2 0 0\nkids 0\n";
   const auto scene = MakeTorcsScene(
-      Model(TriangleObject("A", "grass.rgb", true) + "OBJECT group\nloc 0 5 0\nkids 1\n" +
-                TriangleObject("B", "grass.rgb", true),
-            2),
+      Model(TriangleObject("A", "", true) + TriangleObject("B", "grass.rgb", true) +
+                "OBJECT group\nloc 0 5 0\nkids 1\n" + TriangleObject("C", "", true) + wall,
+            4),
       options_,
       "a.ac");
-  ASSERT_TRUE(scene);
-  ASSERT_EQ(scene->materials.size(), 2U);
-  EXPECT_GT(scene->materials[0].wet_reflectivity, 0.0F);
-  EXPECT_GT(scene->materials[0].wet_darkening, 0.0F);
-  EXPECT_EQ(scene->materials[1].wet_reflectivity, 0.0F);
+  ASSERT_TRUE(scene) << scene.error().message;
+  ASSERT_EQ(scene->materials.size(), 4U);
+  const auto& [road, grass, bridge, upright] =
+      std::tie(scene->materials[0], scene->materials[1], scene->materials[2], scene->materials[3]);
+  EXPECT_GT(road.wet_reflectivity, 0.0F);
+  EXPECT_GT(road.wet_darkening, 0.0F);
+  EXPECT_EQ(grass.wet_reflectivity, 0.0F);
+  EXPECT_GT(grass.wet_darkening, 0.0F);
+  EXPECT_EQ(bridge.wet_reflectivity, 0.0F);
+  EXPECT_GT(bridge.wet_darkening, 0.0F);
+  EXPECT_EQ(upright.wet_darkening, 0.0F);
 }
 
 TEST_F(MakeTorcsSceneTest, MovesFrontAndBackApart) {
