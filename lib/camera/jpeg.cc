@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -81,6 +82,41 @@ bool IsHarmlessWarning(tjhandle handle) {
   return tjGetErrorCode(handle) == TJERR_WARNING &&
          std::string_view(tjGetErrorStr2(handle)).find("extraneous bytes before marker") !=
              std::string_view::npos;
+}
+
+/// @param failed  what decompressing returned.
+Result<void> CheckDecoded(int failed, tjhandle handle, std::size_t bytes, const JpegSize& size) {
+  if (failed == 0 || IsHarmlessWarning(handle)) return {};
+  return Invalid(fmt::format("decoding JPEG: {} bytes of {} x {} px are damaged ({})",
+                             bytes,
+                             size.width,
+                             size.height,
+                             tjGetErrorStr2(handle)));
+}
+
+std::uint8_t ToByte(double value) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
+}
+
+/// Packs an even number of pixels with the weights of JPEG: ITU-R BT.601, full range.
+std::vector<std::uint8_t> YuyvFromRgb(std::span<const std::uint8_t> rgb) {
+  std::vector<std::uint8_t> yuyv;
+  yuyv.reserve(rgb.size() / 3 * 2);
+  for (std::size_t i = 0; i + 5 < rgb.size(); i += 6) {
+    const auto brightness = [&](std::size_t at) {
+      return 0.299 * rgb[at] + 0.587 * rgb[at + 1] + 0.114 * rgb[at + 2];
+    };
+    const double first = brightness(i);
+    const double second = brightness(i + 3);
+    const double mean = 0.5 * (first + second);
+    const double blue = 0.5 * (rgb[i + 2] + rgb[i + 5]);
+    const double red = 0.5 * (rgb[i] + rgb[i + 3]);
+    yuyv.push_back(ToByte(first));
+    yuyv.push_back(ToByte(128.0 + 0.564 * (blue - mean)));
+    yuyv.push_back(ToByte(second));
+    yuyv.push_back(ToByte(128.0 + 0.713 * (red - mean)));
+  }
+  return yuyv;
 }
 
 std::vector<std::uint8_t> CopyOut(const unsigned char* bytes, unsigned long size) {
@@ -214,14 +250,36 @@ Result<GrayImage> DecodeJpegToGray(std::span<const std::uint8_t> jpeg) {
                                    image.height,
                                    TJPF_GRAY,
                                    kDecodeFlags);
-  if (failed != 0 && !IsHarmlessWarning(handle->get())) {
-    return Invalid(fmt::format("decoding JPEG: {} bytes of {} x {} px are damaged ({})",
-                               jpeg.size(),
-                               image.width,
-                               image.height,
-                               tjGetErrorStr2(handle->get())));
+  if (auto ok = CheckDecoded(failed, handle->get(), jpeg.size(), *size); !ok) {
+    return std::move(ok).error();
   }
   return image;
+}
+
+Result<std::vector<std::uint8_t>> DecodeJpegToYuyv(std::span<const std::uint8_t> jpeg) {
+  auto handle = Checked(tjInitDecompress());
+  if (!handle) return std::move(handle).error();
+  auto size = ReadHeader(handle->get(), jpeg);
+  if (!size) return std::move(size).error();
+  if (size->width % 2 != 0) {
+    return Invalid(
+        fmt::format("decoding JPEG to YUYV: the width is {} px, must be even", size->width));
+  }
+  std::vector<std::uint8_t> rgb(3 * static_cast<std::size_t>(size->width) *
+                                static_cast<std::size_t>(size->height));
+  const int failed = tjDecompress2(handle->get(),
+                                   jpeg.data(),
+                                   jpeg.size(),
+                                   rgb.data(),
+                                   size->width,
+                                   3 * size->width,
+                                   size->height,
+                                   TJPF_RGB,
+                                   kDecodeFlags);
+  if (auto ok = CheckDecoded(failed, handle->get(), jpeg.size(), *size); !ok) {
+    return std::move(ok).error();
+  }
+  return YuyvFromRgb(rgb);
 }
 
 Result<std::vector<std::uint8_t>> EncodeGrayToJpeg(const GrayImage& image, int quality) {

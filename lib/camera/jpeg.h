@@ -48,6 +48,11 @@ Result<JpegSize> ReadJpegSize(std::span<const std::uint8_t> jpeg);
 /// @return kInvalidInput when it is no JPEG, is damaged or cut short, or above the limits.
 Result<GrayImage> DecodeJpegToGray(std::span<const std::uint8_t> jpeg);
 
+/// The image as YUYV without padding; its width must be even.
+///
+/// @return kInvalidInput as DecodeJpegToGray, and for an odd width.
+Result<std::vector<std::uint8_t>> DecodeJpegToYuyv(std::span<const std::uint8_t> jpeg);
+
 /// @param quality  1 (smallest) to 100.
 /// @return kInvalidInput when the image's size does not fit its pixels or the limits of this file.
 Result<std::vector<std::uint8_t>> EncodeGrayToJpeg(const GrayImage& image, int quality);

@@ -80,6 +80,19 @@ TEST(JpegTest, RgbKeepsItsBrightness) {
             "encoding JPEG: 6143 bytes for 64 x 32 px, must be 6144");
 }
 
+TEST(JpegTest, YuyvSurvivesBothWays) {
+  const GrayImage image = MakeTestImage(64, 48);
+  const auto yuyv = DecodeJpegToYuyv(EncodeGrayToJpeg(image, 98).value());
+  ASSERT_TRUE(yuyv) << yuyv.error().message;
+  const auto jpeg =
+      EncodeYuyvToJpeg({.bytes = *yuyv, .width = 64, .height = 48, .bytes_per_line = 128}, 98);
+  ASSERT_TRUE(jpeg);
+  EXPECT_LE(WorstDifference(*DecodeJpegToGray(*jpeg), image), 5);
+  EXPECT_EQ((*yuyv)[1], 128);  // gray has no colour
+  EXPECT_EQ(DecodeJpegToYuyv(MakeTestJpeg(63, 48)).error().message,
+            "decoding JPEG to YUYV: the width is 63 px, must be even");
+}
+
 TEST(JpegTest, LowerQualityIsSmaller) {
   EXPECT_LT(MakeTestJpeg(320, 240, 20).size(), MakeTestJpeg(320, 240, 95).size());
 }
