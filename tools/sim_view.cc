@@ -66,7 +66,7 @@ Pose2 PlaceOn(const Path& path, double along_m) {
 /// A camera on the route.
 Pose3 DriverView(const World& world, const Options& options) {
   const Pose2 X_WR = PlaceOn(world.route, options.along_m) * Pose2(0.0, options.left_m, 0.0);
-  const double ground_m = world.ground->HeightAt(X_WR.translation());
+  const double ground_m = world.ground->HeightAlong(X_WR.translation(), X_WR.yaw());
   const Pose3 X_WB(RotationFromRollPitchYaw(
                        0.0, -Radians(options.pitch_deg), X_WR.yaw() + Radians(options.yaw_deg)),
                    {X_WR.x(), X_WR.y(), ground_m + options.height_m});

@@ -4,6 +4,9 @@
 #include <fmt/ranges.h>
 
 #include "simulation/campus.h"
+#include "simulation/campus_cars.h"
+#include "simulation/campus_materials.h"
+#include "simulation/campus_random.h"
 #include "simulation/torcs_track.h"
 
 namespace relocd {
@@ -11,6 +14,12 @@ namespace {
 
 constexpr std::string_view kCampus = "campus";
 constexpr std::string_view kTorcsPrefix = "torcs:";
+
+/// The cars that drive on the campus, for a world that has none of its own.
+void AddCars(const CampusRandom& random, World& world) {
+  const CampusMaterials materials = MakeCampusMaterials(random.Fork(0), world.scene);
+  world.car_meshes = AddCarMeshes(materials, random.Fork(1), world.scene);
+}
 
 }  // namespace
 
@@ -23,7 +32,11 @@ std::vector<std::string> WorldNames() {
 
 Result<World> MakeWorld(const std::string& name, std::uint64_t seed) {
   if (name == kCampus) return MakeCampus(seed);
-  if (name.starts_with(kTorcsPrefix)) return ReadTorcsTrack(name.substr(kTorcsPrefix.size()));
+  if (name.starts_with(kTorcsPrefix)) {
+    auto world = ReadTorcsTrack(name.substr(kTorcsPrefix.size()));
+    if (world) AddCars(CampusRandom(seed), *world);
+    return world;
+  }
   return Error{ErrorKind::kInvalidInput,
                fmt::format("world '{}' is unknown, must be one of {}, or torcs:FOLDER with a slash",
                            name,
