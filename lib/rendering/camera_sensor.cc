@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <thread>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -40,16 +42,46 @@ class SrgbTable {
   std::array<float, kSize + 1> table_{};
 };
 
-/// Two independent draws of a standard normal distribution (Box and Muller, 1958).
-std::array<float, 2> Normals(const CounterRandom& random, std::uint64_t counter) {
-  const std::uint64_t bits = random.Bits(counter);
-  constexpr float kUlp = 1.0F / 4294967296.0F;
-  const float first = (static_cast<float>(bits >> 32U) + 0.5F) * kUlp;
-  const float second = static_cast<float>(bits & 0xFFFFFFFFU) * kUlp;
-  const float radius = std::sqrt(-2.0F * std::log(first));
-  const float angle = 2.0F * std::numbers::pi_v<float> * second;
-  return {radius * std::cos(angle), radius * std::sin(angle)};
-}
+/// Draws of a standard normal distribution, from a table of its quantiles.
+class NormalTable {
+ public:
+  NormalTable() {
+    double sum_of_squares = 0.0;
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      const double probability =
+          (static_cast<double>(i) + 0.5) / static_cast<double>(table_.size());
+      table_.at(i) = static_cast<float>(Quantile(probability));
+      sum_of_squares += Square(table_.at(i));
+    }
+    // The ends, which the table cuts off, carry a little of the variance.
+    const double sigma = std::sqrt(sum_of_squares / static_cast<double>(table_.size()));
+    for (float& value : table_)
+      value = static_cast<float>(value / sigma);
+  }
+
+  /// One draw for each 12 bits.
+  [[nodiscard]] float At(std::uint64_t bits) const { return table_[bits & (kSize - 1)]; }
+
+ private:
+  static constexpr std::size_t kSize = 4096;
+
+  static double Square(double x) { return x * x; }
+
+  /// By bisection of the distribution function.
+  static double Quantile(double probability) {
+    double low = -5.0;
+    double high = 5.0;
+    constexpr int kSteps = 40;
+    for (int i = 0; i < kSteps; ++i) {
+      const double middle = 0.5 * (low + high);
+      const double below = 0.5 * std::erfc(-middle / std::numbers::sqrt2);
+      (below < probability ? low : high) = middle;
+    }
+    return 0.5 * (low + high);
+  }
+
+  std::array<float, kSize> table_{};
+};
 
 }  // namespace
 
@@ -74,32 +106,45 @@ float CameraSensor::VignettingAt(int u, int v, int width, int height) const {
 
 RgbImage CameraSensor::Develop(const LinearImage& radiance,
                                const Exposure& exposure,
-                               std::uint64_t seed) const {
+                               std::uint64_t seed,
+                               int threads) const {
+  RgbImage image{.width = radiance.width, .height = radiance.height, .pixels = {}};
+  image.pixels.resize(3 * radiance.pixels.size());
+  std::vector<std::jthread> workers;
+  for (int i = 0; i < threads; ++i) {
+    const int begin = radiance.height * i / threads;
+    const int end = radiance.height * (i + 1) / threads;
+    workers.emplace_back([this, &radiance, &exposure, seed, begin, end, &image] {
+      for (int v = begin; v < end; ++v)
+        DevelopRow(radiance, exposure, CounterRandom(seed), v, image);
+    });
+  }
+  return image;
+}
+
+void CameraSensor::DevelopRow(const LinearImage& radiance,
+                              const Exposure& exposure,
+                              const CounterRandom& random,
+                              int v,
+                              RgbImage& image) const {
   static const SrgbTable srgb;
-  const CounterRandom random(seed);
+  static const NormalTable normal;
   const auto per_radiance = static_cast<float>(options_.electrons_per_radiance_s * exposure.time_s);
   const auto to_white = static_cast<float>(exposure.gain / options_.full_well_electrons);
   const auto read_variance =
       static_cast<float>(options_.read_noise_electrons * options_.read_noise_electrons);
-  RgbImage image{.width = radiance.width, .height = radiance.height, .pixels = {}};
-  image.pixels.resize(3 * radiance.pixels.size());
-  std::size_t at = 0;
-  for (int v = 0; v < radiance.height; ++v) {
-    for (int u = 0; u < radiance.width; ++u) {
-      const float light = per_radiance * VignettingAt(u, v, radiance.width, radiance.height);
-      const Eigen::Array3f electrons = light * radiance.At(u, v);
-      const auto [first, second] = Normals(random, 2 * at);
-      const float third = Normals(random, 2 * at + 1)[0];
-      const std::array<float, 3> noise{first, second, third};
-      for (std::size_t c = 0; c < 3; ++c) {
-        const float mean = electrons[static_cast<Eigen::Index>(c)];
-        // The normal distribution stands in for Poisson's, which it is close to from some tens on.
-        const float sigma = std::sqrt(std::max(mean, 0.0F) + read_variance);
-        image.pixels[at++] = srgb.At(to_white * (mean + sigma * noise.at(c)));
-      }
+  std::size_t pixel = static_cast<std::size_t>(v) * static_cast<std::size_t>(radiance.width);
+  for (int u = 0; u < radiance.width; ++u, ++pixel) {
+    const float light = per_radiance * VignettingAt(u, v, radiance.width, radiance.height);
+    std::uint64_t bits = random.Bits(pixel);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float mean = light * radiance.pixels[pixel][static_cast<Eigen::Index>(c)];
+      // The normal distribution stands in for Poisson's, which it is close to from some tens on.
+      const float sigma = std::sqrt(std::max(mean, 0.0F) + read_variance);
+      image.pixels[3 * pixel + c] = srgb.At(to_white * (mean + sigma * normal.At(bits)));
+      bits >>= 12U;
     }
   }
-  return image;
 }
 
 Exposure AutoExposure::Next(const LinearImage& radiance, double time_s) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "camera/image.h"
+#include "core/counter_random.h"
 #include "core/result.h"
 #include "rendering/linear_image.h"
 
@@ -33,14 +34,23 @@ class CameraSensor {
   explicit CameraSensor(const CameraSensorOptions& options) : options_(options) {}
 
   /// The same seed gives the same noise.
+  ///
+  /// @param threads  >= 1
   [[nodiscard]] RgbImage Develop(const LinearImage& radiance,
                                  const Exposure& exposure,
-                                 std::uint64_t seed) const;
+                                 std::uint64_t seed,
+                                 int threads = 1) const;
 
   /// The part of the light that reaches a pixel at (u, v) of a width x height image.
   [[nodiscard]] float VignettingAt(int u, int v, int width, int height) const;
 
  private:
+  void DevelopRow(const LinearImage& radiance,
+                  const Exposure& exposure,
+                  const CounterRandom& random,
+                  int v,
+                  RgbImage& image) const;
+
   CameraSensorOptions options_;
 };
 

@@ -27,8 +27,8 @@ constexpr int kTile = 16;
 constexpr float kSharpness = 0.6F;
 /// Within this distance something is near enough to keep the sky's light away.
 constexpr float kOcclusionReach_m = 4.0F;
-/// Of the sun's disk as seen from the ground, a little more than its 0.0047.
-constexpr float kSunRadius = 0.006F;
+/// Of a square as large as the sun's disk, whose radius is 0.0047 as seen from the ground.
+constexpr float kSunSide = 0.0083F;
 /// Rays leave surfaces from this far above them, and more at large distances, where floats are
 /// coarse.
 constexpr float kLift_m = 2e-3F;
@@ -68,8 +68,9 @@ std::array<Eigen::Vector3f, 16> MakeSkyDirections() {
 const std::array<Eigen::Vector3f, 16> kSkyDirections = MakeSkyDirections();
 
 float SchlickFresnel(float reflectivity, float cosine) {
-  const float grazing = std::pow(1.0F - std::clamp(cosine, 0.0F, 1.0F), 5.0F);
-  return reflectivity + (1.0F - reflectivity) * grazing;
+  const float grazing = 1.0F - std::clamp(cosine, 0.0F, 1.0F);
+  const float squared = grazing * grazing;
+  return reflectivity + (1.0F - reflectivity) * squared * squared * grazing;
 }
 
 /// Embree works several times slower on denormal numbers.
@@ -316,7 +317,8 @@ class ImageRenderer::TileRenderer {
   void CastSunRay(const Group& group, std::size_t sample) {
     const Lighting& lighting = renderer_.lighting_;
     const Eigen::Array4f random = Random(samples_[sample].id, kSun);
-    const Eigen::Vector2f disk = kSunRadius * UniformDisk(random[0], random[1]);
+    // A square as large as the disk is as good for soft edges of shadows.
+    const Eigen::Array2f disk = kSunSide * (random.head<2>() - 0.5F);
     Ray ray;
     ray.origin = Above(group, sample);
     if (IsLitFromBehind(group)) {

@@ -24,6 +24,10 @@ Eigen::Array3f SunTransmission(double elevation_rad) {
   return (-optical_depth * air_mass).exp().cast<float>();
 }
 
+float Square(float x) {
+  return x * x;
+}
+
 float SmoothStep(float from, float to, float x) {
   const float t = std::clamp((x - from) / (to - from), 0.0F, 1.0F);
   return t * t * (3.0F - 2.0F * t);
@@ -93,12 +97,14 @@ Lighting::Lighting(const LightingOptions& options, std::span<const Lamp> lamps)
 
 Eigen::Array3f Lighting::SkyRadiance(const Eigen::Vector3f& direction) const {
   const float up = std::max(direction.z(), 0.0F);
-  const float towards_horizon = std::pow(1.0F - up, 4.0F);
+  const float towards_horizon = Square(Square(1.0F - up));
   Eigen::Array3f radiance = zenith_ + towards_horizon * (horizon_ - zenith_);
   if (sun_glow_ > 0.0F) {
     const float cosine = std::max(direction.dot(to_sun_), 0.0F);
-    const float wide = std::pow(cosine, 8.0F) * 0.12F;
-    const float narrow = std::pow(cosine, 180.0F) * 1.2F;
+    const float power_8 = Square(Square(Square(cosine)));
+    const float power_64 = Square(Square(Square(power_8)));
+    const float wide = 0.12F * power_8;
+    const float narrow = 1.2F * power_64 * Square(power_64);
     radiance += sun_glow_ * (wide + narrow) * sun_irradiance_;
   }
   if (cloud_cover_ > 0.0F || sun_glow_ == 0.0F) {

@@ -118,7 +118,8 @@ RgbImage FrameRenderer::Render(std::int64_t time_ns, const CameraMotion& X_WC_at
   const std::uint64_t seed = self.options.seed * 0x10001 + 2 * self.frame_count++;
   LinearImage radiance = self.renderer->Render(sweep, seed);
   self.lens.Apply(radiance, time_s, seed);
-  return self.sensor.Develop(radiance, self.exposure.Next(radiance, time_s), seed + 1);
+  return self.sensor.Develop(
+      radiance, self.exposure.Next(radiance, time_s), seed + 1, self.options.threads);
 }
 
 }  // namespace relocd
