@@ -59,7 +59,7 @@ class RowBuilder {
     HouseStyle style =
         DrawHouseStyle(random_.Pick(row.kinds), stock_.materials, random_, site_.scene());
     // Each shop its own name as long as there are some.
-    style.sign = next_sign_++;
+    style.sign = style.ground_floor == GroundFloor::kEntrance ? 23 : next_sign_++ % 23;
     if (row.gap_m > 0.0) style.is_attached = false;
     return style;
   }
@@ -342,6 +342,25 @@ void AddStreetEnd(const PlaneLine& street, HouseKind kind, RowBuilder& rows) {
   rows.Add({&across, StreetSide::kLeft, 4.0, 28.0, {kind}, 1.0, 3.0, FrontGarden::kNone, false});
 }
 
+/// Along an arc from which houses stand as far back as along streets.
+void AddHousesRoundTurningCircle(const RoadNetwork& network, RowBuilder& rows) {
+  const LinePlace end = PlaceOnLine(network.spur, 1e9);
+  PlaneLine arc;
+  for (double angle = -1.75; angle <= 1.75; angle += 0.05) {
+    arc.emplace_back(end.p_W + (kTurningRadius - kStreetHalfWidth) *
+                                   (std::cos(angle) * end.forward + std::sin(angle) * end.left()));
+  }
+  rows.Add({&arc,
+            StreetSide::kRight,
+            0.0,
+            LineLength(arc),
+            {HouseKind::kVilla, HouseKind::kCottage},
+            3.4,
+            1.0,
+            FrontGarden::kLowHedge,
+            false});
+}
+
 }  // namespace
 
 void AddBuildings(const CampusStock& stock, CampusRandom random, CampusSite& site) {
@@ -351,6 +370,7 @@ void AddBuildings(const CampusStock& stock, CampusRandom random, CampusSite& sit
   for (const auto& [street, kind] : StreetEnds(site.network()))
     AddStreetEnd(*street, kind, rows);
   AddStreetEnd(ReversedLine(site.network().main), HouseKind::kApartments, rows);
+  AddHousesRoundTurningCircle(site.network(), rows);
 }
 
 }  // namespace relocd

@@ -51,15 +51,21 @@ float HashedUnit(std::uint32_t x, std::uint32_t y, std::uint32_t salt) {
 }
 
 TileNoise::TileNoise(CampusRandom random)
-    : field_(static_cast<std::size_t>(kNoiseSide) * kNoiseSide, 0.5F) {
+    : cloud_(static_cast<std::size_t>(kNoiseSide) * kNoiseSide, 0.5F),
+      speckle_(static_cast<std::size_t>(kNoiseSide) * kNoiseSide, 0.5F) {
   float amplitude = 0.55F;
   for (int cells = 4; cells <= 256; cells *= 2) {
-    AddOctave(cells, amplitude, static_cast<std::uint32_t>(random.Bits() >> 40U), field_);
+    AddOctave(cells, amplitude, static_cast<std::uint32_t>(random.Bits() >> 40U), cloud_);
     amplitude *= 0.6F;
+  }
+  amplitude = 0.55F;
+  for (int cells = 32; cells <= 256; cells *= 2) {
+    AddOctave(cells, amplitude, static_cast<std::uint32_t>(random.Bits() >> 40U), speckle_);
+    amplitude *= 0.75F;
   }
 }
 
-float TileNoise::Cloud(float u, float v) const {
+float TileNoise::Sample(const std::vector<float>& field, float u, float v) {
   const float x = (u - std::floor(u)) * kNoiseSide;
   const float y = (v - std::floor(v)) * kNoiseSide;
   const int x0 = static_cast<int>(x);
@@ -67,7 +73,7 @@ float TileNoise::Cloud(float u, float v) const {
   const float fx = x - static_cast<float>(x0);
   const float fy = y - static_cast<float>(y0);
   const auto at = [&](int column, int row) {
-    return field_[static_cast<std::size_t>((row % kNoiseSide) * kNoiseSide + column % kNoiseSide)];
+    return field[static_cast<std::size_t>((row % kNoiseSide) * kNoiseSide + column % kNoiseSide)];
   };
   return (1.0F - fy) * ((1.0F - fx) * at(x0, y0) + fx * at(x0 + 1, y0)) +
          fy * ((1.0F - fx) * at(x0, y0 + 1) + fx * at(x0 + 1, y0 + 1));

@@ -39,10 +39,16 @@ class TileNoise {
 
   /// Clouds of many sizes, the largest a quarter of the period: about 0.5 +- 0.15. Frequencies must
   /// be whole numbers, as in `Cloud(3 * u, 3 * v)`, for the result to repeat with `u` and `v`.
-  [[nodiscard]] float Cloud(float u, float v) const;
+  [[nodiscard]] float Cloud(float u, float v) const { return Sample(cloud_, u, v); }
+
+  /// The same without its large parts: the largest is a 32nd of the period.
+  [[nodiscard]] float Speckle(float u, float v) const { return Sample(speckle_, u, v); }
 
  private:
-  std::vector<float> field_;
+  static float Sample(const std::vector<float>& field, float u, float v);
+
+  std::vector<float> cloud_;
+  std::vector<float> speckle_;
 };
 
 /// An image to paint on; pixel (0, 0) is its upper left one.

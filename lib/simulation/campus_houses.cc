@@ -254,7 +254,7 @@ class HouseBuilder {
     face.AddBox({0.3F, -0.12F, top + 0.04F},
                 {style_.width - 0.3F, 0.0F, top + 0.04F + height},
                 style_.windows.frame);
-    const float length = std::min(style_.width - 0.8F, 7.5F * height);
+    const float length = std::min(style_.width - 0.8F, 5.6F * height);
     const float middle = 0.5F * style_.width;
     face.AddPicture(
         {middle - 0.5F * length, middle + 0.5F * length, top + 0.07F, top + 0.01F + height},
@@ -262,8 +262,7 @@ class HouseBuilder {
         m_.shop_sign,
         kShopSigns.Part(style_.sign));
     const float side = random_.Chance(0.5) ? 0.35F : style_.width - 0.41F;
-    face.AddBox(
-        {side, -0.95F, top + 0.85F}, {side + 0.06F, -0.15F, top + 1.45F}, style_.windows.frame);
+    AddHangingSign(face, side, top + 0.85F);
     if (random_.Chance(0.45)) {
       const Vector3f left = face.PointAt(0.4F, -1.3F, top - 0.35F);
       const Vector3f right = face.PointAt(style_.width - 0.4F, -1.3F, top - 0.35F);
@@ -276,6 +275,19 @@ class HouseBuilder {
                        style_.windows.shutter,
                        0.9F);
     }
+  }
+
+  /// A sign across the sidewalk, with its name on both sides.
+  void AddHangingSign(Facade& face, float left, float bottom) {
+    const float right = left + 0.06F;
+    face.AddBox({left, -1.0F, bottom}, {right, -0.2F, bottom + 0.5F}, style_.windows.frame);
+    face.AddBox(
+        {left + 0.02F, -0.9F, bottom + 0.5F}, {right - 0.02F, 0.0F, bottom + 0.54F}, m_.dark_metal);
+    const Vector3f up(0.0F, 0.0F, 0.14F);
+    const Vector3f near = face.PointAt(left - 0.008F, -0.22F, bottom + 0.18F);
+    const Vector3f far = face.PointAt(right + 0.008F, -0.98F, bottom + 0.18F);
+    builder_.AddPicture(near, {0.0F, -0.76F, 0.0F}, up, m_.shop_sign, kShopSigns.Part(style_.sign));
+    builder_.AddPicture(far, {0.0F, 0.76F, 0.0F}, up, m_.shop_sign, kShopSigns.Part(style_.sign));
   }
 
   void AddGarageFloor(Facade& face) {

@@ -11,7 +11,7 @@ namespace {
 // from above; a space begins a new stroke.
 constexpr std::array<std::string_view, 26> kLetters{
     "062046 1434",                     // A
-    "000630414433 0333 003041423303",  // B
+    "0006 003041423303 333344453606",  // B
     "4130100105163645",                // C
     "000626444220 0020",               // D
     "40000646 0333",                   // E

@@ -49,6 +49,7 @@ void AddRoadMaterials(const TileNoise& noise,
   m.asphalt_old = Add("old asphalt", asphalt, 1.0F, scene);
   scene.materials[m.asphalt_old].albedo = {1.0F, 0.98F, 0.95F};
   m.asphalt_new = Add("new asphalt", asphalt, 0.55F, scene);
+  m.tar = Add("tar", asphalt, 0.3F, scene);
   m.flat_roof = Add("roofing felt", asphalt, 0.7F, scene);
   m.paving =
       Add("paving", AddTexture(MakePavingTexture(noise, random.Fork(1)), scene), 0.9F, scene);
@@ -63,7 +64,7 @@ void AddRoadMaterials(const TileNoise& noise,
       AddCutOut("road details", AddTexture(MakeRoadDetails(noise), scene), 0.5F, scene);
   m.cracks = AddCutOut("cracks", AddTexture(MakeCracks(random.Fork(3)), scene), 0.5F, scene);
   for (const std::uint32_t material :
-       {m.asphalt, m.asphalt_old, m.asphalt_new, m.road_details, m.cracks})
+       {m.asphalt, m.asphalt_old, m.asphalt_new, m.tar, m.road_details, m.cracks})
     MakeWettable(material, 0.05F, 0.45F, scene);
   for (const std::uint32_t material : {m.paving, m.setts, m.gutter, m.kerb, m.road_paint})
     MakeWettable(material, 0.04F, 0.35F, scene);
@@ -94,19 +95,19 @@ void AddGreenMaterials(const TileNoise& noise,
         scene);
   };
   m.leaves[0] = leaves("lime leaves",
-                       0.16F,
+                       0.105F,
                        0.62F,
                        OpaquePaint(0.22F, 0.31F, 0.13F),
                        OpaquePaint(0.40F, 0.48F, 0.22F),
                        11);
   m.leaves[1] = leaves("birch leaves",
-                       0.10F,
+                       0.075F,
                        0.6F,
                        OpaquePaint(0.30F, 0.36F, 0.15F),
                        OpaquePaint(0.53F, 0.54F, 0.26F),
                        12);
   m.leaves[2] = leaves("plane leaves",
-                       0.21F,
+                       0.125F,
                        0.78F,
                        OpaquePaint(0.19F, 0.28F, 0.14F),
                        OpaquePaint(0.36F, 0.42F, 0.20F),
@@ -118,7 +119,7 @@ void AddGreenMaterials(const TileNoise& noise,
                        OpaquePaint(0.27F, 0.34F, 0.20F),
                        14);
   m.hedge = leaves("hedge leaves",
-                   0.12F,
+                   0.11F,
                    0.55F,
                    OpaquePaint(0.15F, 0.24F, 0.11F),
                    OpaquePaint(0.31F, 0.40F, 0.18F),

@@ -18,6 +18,7 @@ struct CampusMaterials {
   std::uint32_t asphalt = 0;
   std::uint32_t asphalt_old = 0;
   std::uint32_t asphalt_new = 0;
+  std::uint32_t tar = 0;
   std::uint32_t paving = 0;
   std::uint32_t setts = 0;
   std::uint32_t gutter = 0;

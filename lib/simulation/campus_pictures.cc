@@ -190,6 +190,7 @@ void DrawShop(Canvas& canvas, const Area& area, std::string_view slogan, CampusR
 }
 
 std::string DrawName(int kind, CampusRandom& random) {
+  if (kind + 1 == kShopSigns.size()) return "UNIVERSITY";
   constexpr std::array<std::string_view, 14> kOwners{"MILLER",
                                                      "ROSA'S",
                                                      "WINTER",
@@ -555,9 +556,9 @@ Texture MakeLeaves(
                       3.0F,
                       twig);
   }
-  const int count = static_cast<int>(2.6F / (leaf_length * leaf_length * slimness));
+  const int count = static_cast<int>(0.95F / (leaf_length * leaf_length * slimness));
   for (int i = 0; i < count; ++i) {
-    const float radius = 0.44F * std::sqrt(random.Unit()) * kSide;
+    const float radius = 0.46F * std::pow(random.Unit(), 0.62F) * kSide;
     const float where = random.Uniform(0.0F, 6.28F);
     const float turn = where + random.Uniform(-1.1F, 1.1F);
     const Vector2f centre =

@@ -18,7 +18,8 @@ struct PictureGrid {
 
 inline constexpr PictureGrid kWindowPictures{4, 2};
 inline constexpr PictureGrid kShopPictures{2, 4};
-inline constexpr PictureGrid kShopSigns{1, 12};
+/// The last one is a university's.
+inline constexpr PictureGrid kShopSigns{2, 12};
 inline constexpr PictureGrid kPosters{4, 4};
 inline constexpr PictureGrid kDoorPictures{4, 2};
 /// Eight traffic signs (see TrafficSign), eight house numbers.

@@ -77,6 +77,19 @@ class RoadPainter {
             material);
   }
 
+  /// A band of tar.
+  void AddBand(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width) {
+    const Eigen::Vector2d step = to - from;
+    if (step.norm() < 1e-6) return;
+    const Eigen::Vector2d left = 0.5 * width * Eigen::Vector2d(-step.y(), step.x()).normalized();
+    // A little longer, so that bands join.
+    const Eigen::Vector2d more = 0.25 * width * step.normalized();
+    AddTiled({from - more - left, to + more - left, to + more + left, from - more + left},
+             kCrackAbove,
+             materials_.tar,
+             kTileAsphalt);
+  }
+
   void AddPatch(const LinePlace& place, const Eigen::Vector2d& size) {
     const Eigen::Vector2d ahead = 0.5 * size.y() * place.forward;
     const Eigen::Vector2d left = 0.5 * size.x() * place.left();
@@ -184,6 +197,11 @@ void AddBayMarks(const RoadNetwork& network, RoadPainter& painter) {
   }
 }
 
+Eigen::Vector2d PlaceBeside(const PlaneLine& street, double s, double across) {
+  const LinePlace place = PlaceOnLine(street, s);
+  return place.p_W + across * place.left();
+}
+
 /// What traffic and repairs have left along a street.
 void AddWear(const PlaneLine& street, CampusRandom& random, RoadPainter& painter) {
   const double length = LineLength(street);
@@ -232,6 +250,26 @@ void AddWear(const PlaneLine& street, CampusRandom& random, RoadPainter& painter
   }
 }
 
+/// Cracks that were sealed with tar: narrow dark bands that wander.
+void AddSealedCracks(const PlaneLine& street, CampusRandom& random, RoadPainter& painter) {
+  for (double s = random.Uniform(5.0, 15.0); s + 12.0 < LineLength(street);
+       s += random.Uniform(9.0, 22.0)) {
+    double across = random.Uniform(-2.8, 2.8);
+    const bool is_along = random.Chance(0.6);
+    const double drift = across > 0.0 ? -0.3 : 0.3;
+    const int parts = 6 + static_cast<int>(random.Index(12));
+    Eigen::Vector2d last = PlaceBeside(street, s, across);
+    for (int i = 1; i < parts; ++i) {
+      const double ahead =
+          is_along ? 0.5 * i + random.Uniform(-0.12, 0.12) : random.Uniform(-0.2, 0.2);
+      across = std::clamp(across + (is_along ? random.Uniform(-0.16, 0.16) : drift), -2.9, 2.9);
+      const Eigen::Vector2d next = PlaceBeside(street, s + ahead, across);
+      painter.AddBand(last, next, random.Uniform(0.05, 0.09));
+      last = next;
+    }
+  }
+}
+
 void AddDrains(const RoadNetwork& network, const PlaneLine& street, RoadPainter& painter) {
   const double length = LineLength(street);
   for (double s = 11.0; s < length - 4.0; s += 24.0) {
@@ -260,6 +298,7 @@ void AddRoadMarks(const CampusGround& ground,
   AddBayMarks(network, painter);
   for (const PlaneLine* const street : network.Streets()) {
     AddWear(*street, random, painter);
+    AddSealedCracks(*street, random, painter);
     AddDrains(network, *street, painter);
   }
   scene.instances.push_back({.mesh = scene.AddMesh(painter.Take())});

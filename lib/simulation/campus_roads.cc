@@ -256,6 +256,10 @@ void AddSpur(const TownSize& size, CampusRandom& random, RoadNetwork& network) {
 
 }  // namespace
 
+bool RoadNetwork::IsPavedAt(const Eigen::Vector2d& p_W) const {
+  return p_W.x() > 3.0 && p_W.x() < spur.front().x() + 4.0 && std::abs(p_W.y()) < 16.0;
+}
+
 RoadNetwork MakeRoadNetwork(CampusRandom random) {
   const TownSize size = DrawSize(random);
   RoadNetwork network;

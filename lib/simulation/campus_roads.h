@@ -61,6 +61,9 @@ struct RoadNetwork {
   std::vector<Path> traffic;
   std::vector<ParkingSpot> parking_spots;
 
+  /// Whether the ground beside the sidewalks is paved, as it is before shops, and no lawn.
+  [[nodiscard]] bool IsPavedAt(const Eigen::Vector2d& p_W) const;
+
   /// All lines of streets, in the order in which `ParkingBay::street` counts.
   [[nodiscard]] std::vector<const PlaneLine*> Streets() const {
     return {&main, &ring, &west, &spur, &side_north, &drive};

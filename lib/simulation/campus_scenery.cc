@@ -332,7 +332,8 @@ class SceneryBuilder {
         for (const StreetSide side : {StreetSide::kLeft, StreetSide::kRight}) {
           const double gap = kSidewalkWidth + random_.Uniform(0.9, 4.5);
           const auto place = site_.BesideStreet(*street, side, s, gap);
-          if (place && site_.IsFree(place->p_W, 1.3, kSidewalkWidth + 0.7))
+          if (place && !site_.network().IsPavedAt(place->p_W) &&
+              site_.IsFree(place->p_W, 1.3, kSidewalkWidth + 0.7))
             site_.Place(random_.Pick(stock_.plants.tufts), place->p_W, AnyDirection());
         }
       }
@@ -344,7 +345,7 @@ class SceneryBuilder {
     const RoadField& field = site_.field();
     const Eigen::Vector2d low = field.low().cast<double>();
     const Eigen::Vector2d high = field.high().cast<double>();
-    for (int i = 0; i < 520; ++i) {
+    for (int i = 0; i < 760; ++i) {
       const Eigen::Vector2d p_W{random_.Uniform(low.x() - 40.0, high.x() + 40.0),
                                 random_.Uniform(low.y() - 40.0, high.y() + 40.0)};
       const auto kind = std::array{TreeKind::kLime,

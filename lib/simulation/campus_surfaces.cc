@@ -217,9 +217,7 @@ class GroundCutter {
 
   /// Streets in the south-west are paved up to the shops.
   SurfaceMesh& LawnAt(const Eigen::Vector2d& p_W) {
-    const double spur = network_.spur.front().x();
-    const bool is_shops = p_W.x() > 3.0 && p_W.x() < spur + 4.0 && std::abs(p_W.y()) < 16.0;
-    if (is_shops) return meshes_.paving;
+    if (network_.IsPavedAt(p_W)) return meshes_.paving;
     const bool is_wild = p_W.y() > network_.ring.back().y() + 12.0 || field_.DistanceAt(p_W) > 22.0;
     return is_wild ? meshes_.meadow : meshes_.grass;
   }

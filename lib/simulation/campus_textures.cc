@@ -63,8 +63,8 @@ Texture MakeAsphaltTexture(const TileNoise& noise) {
   canvas.Fill([&](int x, int y) {
     const Texel t = TexelAt(x, y, kSide);
     const float coarse = noise.Cloud(t.u, t.v) - 0.5F;
-    const float stones = noise.Cloud(7.0F * t.u, 7.0F * t.v + 0.3F) - 0.5F;
-    float grey = 0.385F + 0.10F * coarse + 0.16F * stones + 0.055F * t.grain;
+    const float stones = noise.Speckle(t.u, t.v) - 0.5F;
+    float grey = 0.385F + 0.12F * coarse + 0.13F * stones + 0.055F * t.grain;
     if (t.grain > 0.955F) grey += 0.2F;
     if (t.grain < -0.965F) grey -= 0.13F;
     return GreyPaint(grey, 0.004F + 0.02F * coarse);
@@ -81,14 +81,14 @@ Texture MakePavingTexture(const TileNoise& noise, CampusRandom random) {
     const Stone stone = StoneAt(t.u, t.v, {6, 6}, 0.5F, {0.4F, 0.4F});
     const float tint = HashedUnit(stone.column, stone.row, salt) - 0.5F;
     const float cloud = noise.Cloud(2.0F * t.u, 2.0F * t.v) - 0.5F;
-    const float fine = noise.Cloud(9.0F * t.u, 9.0F * t.v) - 0.5F;
+    const float fine = noise.Speckle(t.u, t.v) - 0.5F;
     float grey = 0.57F + 0.11F * tint + 0.14F * cloud + 0.08F * fine + 0.03F * t.grain;
     if (stone.edge < 0.006F)
       grey = 0.33F + 0.1F * cloud;
     else if (stone.edge < 0.012F)
       grey -= 0.06F;
     // Old chewing gum.
-    if (noise.Cloud(5.0F * t.u + 0.37F, 5.0F * t.v) > 0.86F) grey -= 0.12F;
+    if (noise.Speckle(t.u + 0.37F, t.v) > 0.93F) grey -= 0.12F;
     return GreyPaint(grey, 0.012F + 0.015F * tint);
   });
   return canvas.ToTexture();
@@ -117,7 +117,7 @@ Texture MakeGrassTexture(const TileNoise& noise) {
   canvas.Fill([&](int x, int y) {
     const Texel t = TexelAt(x, y, kSide);
     const float dry = noise.Cloud(t.u, t.v);
-    const float tufts = noise.Cloud(6.0F * t.u, 6.0F * t.v) - 0.5F;
+    const float tufts = noise.Speckle(t.u, t.v) - 0.5F;
     const float light = 1.0F + 0.5F * tufts + 0.22F * t.grain;
     const Paint green = OpaquePaint(0.315F, 0.385F, 0.195F);
     const Paint straw = OpaquePaint(0.47F, 0.45F, 0.285F);
@@ -140,7 +140,7 @@ Texture MakeBrickTexture(const TileNoise& noise,
     const float tint = HashedUnit(stone.column, stone.row, salt);
     const float shade = HashedUnit(stone.column, stone.row, salt + 1U);
     const float cloud = noise.Cloud(t.u, t.v) - 0.5F;
-    const float fine = noise.Cloud(12.0F * t.u, 12.0F * t.v) - 0.5F;
+    const float fine = noise.Speckle(t.u, t.v) - 0.5F;
     if (stone.edge < 0.0058F + 0.003F * fine)
       return Shaded(mortar, 1.0F + 0.3F * cloud + 0.05F * t.grain);
     float light = 0.86F + 0.28F * shade + 0.25F * cloud + 0.2F * fine + 0.05F * t.grain;
@@ -157,7 +157,7 @@ Texture MakePlasterTexture(const TileNoise& noise) {
   canvas.Fill([&](int x, int y) {
     const Texel t = TexelAt(x, y, kSide);
     const float cloud = noise.Cloud(t.u, t.v) - 0.5F;
-    const float rough = noise.Cloud(10.0F * t.u, 10.0F * t.v) - 0.5F;
+    const float rough = noise.Speckle(t.u, t.v) - 0.5F;
     // Streaks that run down.
     const float streaks = noise.Cloud(8.0F * t.u, t.v + 0.6F) - 0.5F;
     const float grey = 0.88F + 0.10F * cloud + 0.07F * rough + 0.06F * streaks + 0.025F * t.grain;
@@ -227,7 +227,7 @@ Texture MakeConcreteTexture(const TileNoise& noise) {
     const Texel t = TexelAt(x, y, kSide);
     const Stone panel = StoneAt(t.u, t.v, {2, 2}, 0.0F, {1.8F, 1.8F});
     const float cloud = noise.Cloud(t.u, t.v) - 0.5F;
-    const float fine = noise.Cloud(8.0F * t.u, 8.0F * t.v) - 0.5F;
+    const float fine = noise.Speckle(t.u, t.v) - 0.5F;
     float grey = 0.63F + 0.16F * cloud + 0.08F * fine + 0.025F * t.grain;
     if (panel.edge < 0.012F) grey *= 0.6F;
     const float x_hole = std::abs(std::abs(panel.along - 0.5F) - 0.3F) * 1.8F;
@@ -299,10 +299,10 @@ Texture MakeRoadPaintTexture(const TileNoise& noise) {
   Canvas canvas(kSide, kSide, GreyPaint(0.85F));
   canvas.Fill([&](int x, int y) {
     const Texel t = TexelAt(x, y, kSide);
-    const float worn = noise.Cloud(5.0F * t.u, 5.0F * t.v);
+    const float worn = 0.5F * (noise.Cloud(t.u, t.v) + noise.Speckle(t.u, t.v));
     const float dirt = noise.Cloud(t.u, t.v) - 0.5F;
     Paint paint = GreyPaint(0.80F + 0.2F * dirt + 0.05F * t.grain, 0.008F);
-    paint[3] = worn + 0.05F * t.grain > 0.70F ? 0.0F : 1.0F;
+    paint[3] = worn + 0.04F * t.grain > 0.63F ? 0.0F : 1.0F;
     return paint;
   });
   return canvas.ToTexture();
