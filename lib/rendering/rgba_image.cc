@@ -51,33 +51,45 @@ std::vector<std::vector<Tap>> MakeTaps(int old_size, int new_size) {
   return taps;
 }
 
-/// Colour counts as much as it covers.
+/// A mean of pixels, in which colour counts as much as it covers.
+struct PixelMean {
+  std::array<float, kChannels> covered{};  ///< The colours times their coverage, and the coverage.
+  std::array<float, kChannels> plain{};
+
+  void Add(const std::uint8_t* pixel, float weight) {
+    const float coverage = weight * static_cast<float>(pixel[3]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      covered.at(c) += coverage * static_cast<float>(pixel[c]);
+      plain.at(c) += weight * static_cast<float>(pixel[c]);
+    }
+    covered[3] += coverage;
+  }
+
+  [[nodiscard]] std::array<std::uint8_t, kChannels> Get() const {
+    const auto to_byte = [](float value) {
+      return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 255.0F)));
+    };
+    std::array<std::uint8_t, kChannels> mean{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      mean.at(c) = to_byte(covered[3] > 0.0F ? covered.at(c) / covered[3] : plain.at(c));
+    }
+    mean[3] = to_byte(covered[3]);
+    return mean;
+  }
+};
+
 std::array<std::uint8_t, kChannels> Mix(const RgbaImage& image,
                                         const std::vector<Tap>& rows,
                                         const std::vector<Tap>& columns) {
-  std::array<float, kChannels> colour{};
-  std::array<float, kChannels> plain{};
+  const auto width = static_cast<std::size_t>(image.width);
+  PixelMean mean;
   for (const Tap& row : rows) {
     for (const Tap& column : columns) {
-      const std::uint8_t* const pixel =
-          &image.pixels[kChannels *
-                        (row.source * static_cast<std::size_t>(image.width) + column.source)];
-      const float weight = row.weight * column.weight;
-      const float covered = weight * static_cast<float>(pixel[3]);
-      for (std::size_t c = 0; c < 3; ++c) {
-        colour.at(c) += covered * static_cast<float>(pixel[c]);
-        plain.at(c) += weight * static_cast<float>(pixel[c]);
-      }
-      colour[3] += covered;
+      mean.Add(&image.pixels[kChannels * (row.source * width + column.source)],
+               row.weight * column.weight);
     }
   }
-  std::array<std::uint8_t, kChannels> mixed{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    const float value = colour[3] > 0.0F ? colour.at(c) / colour[3] : plain.at(c);
-    mixed.at(c) = static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 255.0F)));
-  }
-  mixed[3] = static_cast<std::uint8_t>(std::lround(std::clamp(colour[3], 0.0F, 255.0F)));
-  return mixed;
+  return mean.Get();
 }
 
 }  // namespace

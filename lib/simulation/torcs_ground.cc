@@ -40,6 +40,19 @@ double HeightOf(const Triangle& triangle, const Eigen::Vector2d& p) {
          b * static_cast<double>(triangle[1].z()) + c * static_cast<double>(triangle[2].z());
 }
 
+/// Pairs an item with all cells of a rectangle.
+void AppendCells(const Eigen::Vector2i& first,
+                 const Eigen::Vector2i& last,
+                 int columns,
+                 std::uint32_t item,
+                 std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
+  for (int y = first.y(); y <= last.y(); ++y) {
+    for (int x = first.x(); x <= last.x(); ++x) {
+      pairs.emplace_back(static_cast<std::uint32_t>(y * columns + x), item);
+    }
+  }
+}
+
 bool IsDrivable(const Triangle& triangle) {
   const Eigen::Vector3f normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
   return std::abs(normal.z()) > kSmallestUp * normal.norm();
@@ -124,70 +137,57 @@ Result<void> TorcsGround::AddTriangles(std::span<const Triangle> triangles_W) {
                    fmt::format("too many large triangles: they cover more than {} squares of {} m",
                                kMaxPairs,
                                grid.cell_m)};
-    for (int y = first.y(); y <= last.y(); ++y) {
-      for (int x = first.x(); x <= last.x(); ++x) {
-        pairs.emplace_back(static_cast<std::uint32_t>(y * grid.size.x() + x),
-                           static_cast<std::uint32_t>(triangles_.size()));
-      }
-    }
+    AppendCells(first, last, grid.size.x(), static_cast<std::uint32_t>(triangles_.size()), pairs);
     triangles_.push_back(triangle);
   }
   grid.Fill(std::move(pairs));
   return {};
 }
 
-std::size_t TorcsGround::NearestStation(const Eigen::Vector2d& p) const {
-  const Eigen::Vector2i middle = station_grid_.CellOf(p);
-  const int rings = station_grid_.size.maxCoeff();
-  double best = std::numeric_limits<double>::infinity();
-  std::size_t nearest = 0;
-  for (int ring = 0; ring <= rings; ++ring) {
-    // Nothing that is further out can be nearer.
-    if ((ring - 1) * station_grid_.cell_m > best) break;
-    for (int y = std::max(middle.y() - ring, 0);
-         y <= std::min(middle.y() + ring, station_grid_.size.y() - 1);
-         ++y) {
-      const bool is_whole_row = std::abs(y - middle.y()) == ring;
-      for (int x = middle.x() - ring; x <= middle.x() + ring; x += is_whole_row ? 1 : 2 * ring) {
-        if (x < 0 || x >= station_grid_.size.x()) continue;
-        for (const std::uint32_t i : station_grid_.ItemsOf({x, y})) {
-          const double distance = (stations_[i].p_T - p).norm();
-          if (distance < best) {
-            best = distance;
-            nearest = i;
-          }
-        }
-      }
+std::vector<std::uint32_t> TorcsGround::StationsNear(const Eigen::Vector2d& p,
+                                                     double radius_m) const {
+  std::vector<std::uint32_t> near;
+  const Eigen::Vector2i first = station_grid_.CellOf(p - Eigen::Vector2d::Constant(radius_m));
+  const Eigen::Vector2i last = station_grid_.CellOf(p + Eigen::Vector2d::Constant(radius_m));
+  for (int y = first.y(); y <= last.y(); ++y) {
+    for (int x = first.x(); x <= last.x(); ++x) {
+      const auto stations = station_grid_.ItemsOf({x, y});
+      near.insert(near.end(), stations.begin(), stations.end());
     }
   }
-  return nearest;
+  return near;
+}
+
+std::size_t TorcsGround::NearestStation(const Eigen::Vector2d& p) const {
+  const auto distance_to = [&](std::size_t i) { return (stations_[i].p_T - p).norm(); };
+  for (double radius = 0.5 * width_;; radius *= 2.0) {
+    const auto near = StationsNear(p, radius);
+    const auto nearest = std::min_element(
+        near.begin(), near.end(), [&](auto a, auto b) { return distance_to(a) < distance_to(b); });
+    // What is further away than the radius may be missing.
+    const bool has_all = near.size() == stations_.size();
+    if (nearest != near.end() && (has_all || distance_to(*nearest) <= radius)) return *nearest;
+  }
 }
 
 template <typename Difference>
 std::size_t TorcsGround::NearestFitting(const Eigen::Vector2d& p,
                                         const Difference& difference,
                                         double hardly) const {
-  const std::size_t nearest = NearestStation(p);
-  double least = difference(nearest);
-  if (least <= hardly) return nearest;
+  std::size_t best = NearestStation(p);
+  double least = difference(best);
+  if (least <= hardly) return best;
   const double radius = 0.5 * width_ + 3.0;
-  std::vector<std::size_t> near;
-  const Eigen::Vector2i first = station_grid_.CellOf(p - Eigen::Vector2d::Constant(radius));
-  const Eigen::Vector2i last = station_grid_.CellOf(p + Eigen::Vector2d::Constant(radius));
-  for (int y = first.y(); y <= last.y(); ++y) {
-    for (int x = first.x(); x <= last.x(); ++x) {
-      for (const std::uint32_t i : station_grid_.ItemsOf({x, y})) {
-        if ((stations_[i].p_T - p).norm() > radius) continue;
-        near.push_back(i);
-        least = std::min(least, difference(i));
-      }
-    }
+  const auto near = StationsNear(p, radius);
+  const auto distance_to = [&](std::size_t i) { return (stations_[i].p_T - p).norm(); };
+  for (const std::uint32_t i : near) {
+    if (distance_to(i) <= radius) least = std::min(least, difference(i));
   }
-  std::size_t best = nearest;
   double best_distance = std::numeric_limits<double>::infinity();
-  for (const std::size_t i : near) {
-    const double distance = (stations_[i].p_T - p).norm();
-    if (distance >= best_distance || difference(i) > least + hardly) continue;
+  for (const std::uint32_t i : near) {
+    const double distance = distance_to(i);
+    if (distance > radius || distance >= best_distance) continue;
+    if (difference(i) > least + hardly) continue;
     best = i;
     best_distance = distance;
   }
@@ -240,10 +240,10 @@ double TorcsGround::HeightAt(const Eigen::Vector2d& p_W) const {
   return SmoothHeight(p_W, DescribedHeightAt(p_W));
 }
 
-double TorcsGround::HeightAlong(const Eigen::Vector2d& p_W, double heading_W_rad) const {
+double TorcsGround::HeightAlong(const Eigen::Vector2d& p_W, double heading_rad) const {
   // Of two lines, from 0 for parallel ones to 1 for a right angle.
   const auto angle_to = [&](std::size_t station) {
-    return std::abs(std::sin(stations_[station].yaw_T_rad - heading_W_rad));
+    return std::abs(std::sin(stations_[station].yaw_T_rad - heading_rad));
   };
   constexpr double kSamePart = 0.4;
   return SmoothHeight(p_W, PlaneOf(NearestFitting(p_W, angle_to, kSamePart), p_W));

@@ -31,7 +31,7 @@ class TorcsGround final : public Ground {
                                                            std::span<const Triangle> triangles_W);
 
   [[nodiscard]] double HeightAt(const Eigen::Vector2d& p_W) const override;
-  [[nodiscard]] double HeightAlong(const Eigen::Vector2d& p_W, double heading_W_rad) const override;
+  [[nodiscard]] double HeightAlong(const Eigen::Vector2d& p_W, double heading_rad) const override;
 
   /// Where the road as described has its surface, near `p_W`: the plane of the nearest station.
   [[nodiscard]] double DescribedHeightAt(const Eigen::Vector2d& p_W) const;
@@ -58,6 +58,9 @@ class TorcsGround final : public Ground {
 
   [[nodiscard]] static Grid MakeGrid(const std::vector<TorcsStation>& stations, double cell_m);
   [[nodiscard]] Result<void> AddTriangles(std::span<const Triangle> triangles_W);
+  /// At least those within the radius.
+  [[nodiscard]] std::vector<std::uint32_t> StationsNear(const Eigen::Vector2d& p,
+                                                        double radius_m) const;
   [[nodiscard]] std::size_t NearestStation(const Eigen::Vector2d& p) const;
   /// Of those nearby, the nearest for which `difference` is hardly more than the least.
   template <typename Difference>

@@ -31,64 +31,91 @@ Eigen::Vector3f ToWorld(const Eigen::Vector3f& p_A) {
   return {p_A.x(), -p_A.z(), p_A.y()};
 }
 
-/// A triangle of a surface, as the indices of three of its corners.
-using CornerTriple = std::array<std::size_t, 3>;
+/// A triangle of an object.
+struct ObjectTriangle {
+  const Ac3dSurface* surface = nullptr;
+  std::array<Ac3dCorner, 3> corners;
+};
 
 /// Fans and strips; lines have none.
-std::vector<CornerTriple> TrianglesOf(const Ac3dSurface& surface) {
-  std::vector<CornerTriple> triangles;
-  const std::size_t count = surface.corners.size();
-  for (std::size_t i = 2; i < count; ++i) {
+void AppendTriangles(const Ac3dSurface& surface, std::vector<ObjectTriangle>& triangles) {
+  const auto& corners = surface.corners;
+  for (std::size_t i = 2; i < corners.size(); ++i) {
     if (surface.kind == Ac3dSurface::Kind::kPolygon) {
-      triangles.push_back({0, i - 1, i});
+      triangles.push_back({&surface, {corners[0], corners[i - 1], corners[i]}});
     } else if (surface.kind == Ac3dSurface::Kind::kTriangleStrip) {
-      const bool is_even = i % 2 == 0;
-      triangles.push_back({is_even ? i - 2 : i - 1, is_even ? i - 1 : i - 2, i});
+      // Each second triangle goes round the other way.
+      const std::size_t odd = i % 2;
+      triangles.push_back({&surface, {corners[i - 2 + odd], corners[i - 1 - odd], corners[i]}});
     }
+  }
+}
+
+std::vector<ObjectTriangle> TrianglesOf(const Ac3dObject& object) {
+  std::vector<ObjectTriangle> triangles;
+  for (const Ac3dSurface& surface : object.surfaces) {
+    AppendTriangles(surface, triangles);
   }
   return triangles;
 }
 
 /// An object's vertices and normals in W.
-struct PlacedObject {
-  std::vector<Eigen::Vector3f> positions;
-  std::vector<Eigen::Vector3f> normals;
-};
-
-PlacedObject Place(const Ac3dModel& model, std::size_t index) {
-  const Ac3dObject& object = model.objects[index];
-  const Eigen::Affine3f X_AO = model.PlaceOf(index);
-  PlacedObject placed;
-  for (const Eigen::Vector3f& vertex : object.vertices) {
-    placed.positions.push_back(ToWorld(X_AO * vertex));
+class PlacedObject {
+ public:
+  PlacedObject(const Ac3dModel& model, std::size_t index) {
+    const Ac3dObject& object = model.objects[index];
+    const Eigen::Affine3f X_AO = model.PlaceOf(index);
+    for (const Eigen::Vector3f& vertex : object.vertices) {
+      positions_.push_back(ToWorld(X_AO * vertex));
+    }
+    for (const Eigen::Vector3f& normal : object.normals) {
+      normals_.push_back(ToWorld(X_AO.linear() * normal));
+    }
   }
-  for (const Eigen::Vector3f& normal : object.normals) {
-    placed.normals.push_back(ToWorld(X_AO.linear() * normal));
-  }
-  return placed;
-}
 
-/// For each vertex the normals of the smooth faces round it, as long as twice their areas.
-std::vector<std::vector<Eigen::Vector3f>> FaceNormals(const Ac3dObject& object,
-                                                      const PlacedObject& placed) {
-  std::vector<std::vector<Eigen::Vector3f>> normals(placed.positions.size());
-  for (const Ac3dSurface& surface : object.surfaces) {
-    if (!surface.is_smooth) continue;
-    for (const CornerTriple& triangle : TrianglesOf(surface)) {
-      std::array<std::uint32_t, 3> vertices{};
-      for (std::size_t i = 0; i < 3; ++i) {
-        vertices.at(i) = surface.corners[triangle.at(i)].vertex;
-      }
-      const Eigen::Vector3f& a = placed.positions[vertices[0]];
-      const Eigen::Vector3f normal =
-          (placed.positions[vertices[1]] - a).cross(placed.positions[vertices[2]] - a);
-      for (const std::uint32_t vertex : vertices) {
-        normals[vertex].push_back(normal);
+  [[nodiscard]] const std::vector<Eigen::Vector3f>& positions() const { return positions_; }
+
+  [[nodiscard]] std::array<Eigen::Vector3f, 3> CornersOf(const ObjectTriangle& triangle) const {
+    const auto& [a, b, c] = triangle.corners;
+    return {positions_[a.vertex], positions_[b.vertex], positions_[c.vertex]};
+  }
+
+  /// Twice the triangle's area long.
+  [[nodiscard]] Eigen::Vector3f CrossOf(const ObjectTriangle& triangle) const {
+    const auto [a, b, c] = CornersOf(triangle);
+    return (b - a).cross(c - a);
+  }
+
+  /// Makes normals of the smooth triangles round each vertex, where the file has none.
+  void MakeNormals(const std::vector<ObjectTriangle>& triangles) {
+    if (!normals_.empty()) return;
+    crosses_.resize(positions_.size());
+    for (const ObjectTriangle& triangle : triangles) {
+      if (!triangle.surface->is_smooth) continue;
+      for (const Ac3dCorner& corner : triangle.corners) {
+        crosses_[corner.vertex].push_back(CrossOf(triangle));
       }
     }
   }
-  return normals;
-}
+
+  /// Of length 1, at a vertex of a triangle with the normal `face`.
+  [[nodiscard]] Eigen::Vector3f NormalAt(std::uint32_t vertex, const Eigen::Vector3f& face) const {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    if (!normals_.empty()) sum = normals_[vertex];
+    for (std::size_t i = 0; normals_.empty() && i < crosses_[vertex].size(); ++i) {
+      const Eigen::Vector3f& cross = crosses_[vertex][i];
+      if (cross.dot(face) > kCreaseCosine * cross.norm()) sum += cross;
+    }
+    const float length = sum.norm();
+    // A normal that does not fit its face is worse than none.
+    return length > 0.0F && sum.dot(face) > 0.3F * length ? Eigen::Vector3f(sum / length) : face;
+  }
+
+ private:
+  std::vector<Eigen::Vector3f> positions_;
+  std::vector<Eigen::Vector3f> normals_;               ///< Empty, or one for each vertex.
+  std::vector<std::vector<Eigen::Vector3f>> crosses_;  ///< For each vertex, if there are none.
+};
 
 /// Puts all surfaces into one mesh and a scene's materials.
 class SceneBuilder {
@@ -118,11 +145,17 @@ class SceneBuilder {
   using MaterialKey = std::tuple<int, std::uint32_t, Wetting>;
 
   Result<void> AddObject(std::size_t index);
+  void AddTriangle(const Ac3dObject& object,
+                   const PlacedObject& placed,
+                   const ObjectTriangle& triangle,
+                   int texture);
   Result<int> TextureOf(const Ac3dObject& object);
   std::uint32_t MaterialOf(const Ac3dObject& object, const MaterialKey& key);
   [[nodiscard]] Wetting WettingOf(const std::array<Eigen::Vector3f, 3>& p_Ws,
                                   const Eigen::Vector3f& normal) const;
   void SeparateCoincident();
+  [[nodiscard]] std::array<float, 9> SortedCorners(std::size_t triangle) const;
+  void MoveAlongNormal(std::size_t triangle, float distance_m);
   [[nodiscard]] Mesh Part(bool with_holes) const;
 
   const Ac3dModel& model_;
@@ -212,47 +245,62 @@ Result<void> SceneBuilder::AddObject(std::size_t index) {
   const Ac3dObject& object = model_.objects[index];
   const auto texture = TextureOf(object);
   if (!texture) return texture.error();
-  const PlacedObject placed = Place(model_, index);
-  const auto face_normals = object.normals.empty() ? FaceNormals(object, placed)
-                                                   : std::vector<std::vector<Eigen::Vector3f>>();
-  const auto normal_at = [&](std::uint32_t vertex, const Eigen::Vector3f& face) {
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    if (!placed.normals.empty()) {
-      sum = placed.normals[vertex];
-    } else {
-      for (const Eigen::Vector3f& normal : face_normals[vertex]) {
-        if (normal.dot(face) > kCreaseCosine * normal.norm()) sum += normal;
-      }
-    }
-    const float length = sum.norm();
-    // A normal that does not fit its face is worse than none.
-    return length > 0.0F && sum.dot(face) > 0.3F * length ? Eigen::Vector3f(sum / length) : face;
-  };
-  for (const Ac3dSurface& surface : object.surfaces) {
-    for (const CornerTriple& triangle : TrianglesOf(surface)) {
-      std::array<Eigen::Vector3f, 3> p_Ws;
-      for (std::size_t i = 0; i < 3; ++i) {
-        p_Ws.at(i) = placed.positions[surface.corners[triangle.at(i)].vertex];
-      }
-      const Eigen::Vector3f cross = (p_Ws[1] - p_Ws[0]).cross(p_Ws[2] - p_Ws[0]);
-      if (!(cross.norm() > kSmallestAreaM2)) continue;
-      const Eigen::Vector3f face = cross.normalized();
-      const std::uint32_t material = MaterialOf(
-          object, {*texture, *texture >= 0 ? 0U : surface.material, WettingOf(p_Ws, face)});
-      const auto first = static_cast<std::uint32_t>(mesh_.positions.size());
-      for (std::size_t i = 0; i < 3; ++i) {
-        const Ac3dCorner& corner = surface.corners[triangle.at(i)];
-        const Eigen::Vector2f uv =
-            corner.uv.cwiseProduct(object.texture_repeat) + object.texture_offset;
-        mesh_.positions.push_back(p_Ws.at(i));
-        mesh_.normals.push_back(surface.is_smooth ? normal_at(corner.vertex, face) : face);
-        mesh_.uvs.emplace_back(uv.x(), 1.0F - uv.y());
-      }
-      mesh_.triangles.push_back({first, first + 1, first + 2});
-      mesh_.triangle_materials.push_back(material);
-    }
+  PlacedObject placed(model_, index);
+  const auto triangles = TrianglesOf(object);
+  placed.MakeNormals(triangles);
+  for (const ObjectTriangle& triangle : triangles) {
+    AddTriangle(object, placed, triangle, *texture);
   }
   return {};
+}
+
+void SceneBuilder::AddTriangle(const Ac3dObject& object,
+                               const PlacedObject& placed,
+                               const ObjectTriangle& triangle,
+                               int texture) {
+  const Eigen::Vector3f cross = placed.CrossOf(triangle);
+  if (!(cross.norm() > kSmallestAreaM2)) return;
+  const Eigen::Vector3f face = cross.normalized();
+  const auto p_Ws = placed.CornersOf(triangle);
+  const std::uint32_t material = MaterialOf(
+      object, {texture, texture >= 0 ? 0U : triangle.surface->material, WettingOf(p_Ws, face)});
+  const auto first = static_cast<std::uint32_t>(mesh_.positions.size());
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Ac3dCorner& corner = triangle.corners.at(i);
+    const Eigen::Vector2f uv =
+        corner.uv.cwiseProduct(object.texture_repeat) + object.texture_offset;
+    mesh_.positions.push_back(p_Ws.at(i));
+    mesh_.normals.push_back(triangle.surface->is_smooth ? placed.NormalAt(corner.vertex, face)
+                                                        : face);
+    mesh_.uvs.emplace_back(uv.x(), 1.0F - uv.y());
+  }
+  mesh_.triangles.push_back({first, first + 1, first + 2});
+  mesh_.triangle_materials.push_back(material);
+}
+
+/// What is the same of two triangles that coincide.
+std::array<float, 9> SceneBuilder::SortedCorners(std::size_t triangle) const {
+  std::array<std::array<float, 3>, 3> corners{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Eigen::Vector3f& p = mesh_.positions[mesh_.triangles[triangle].at(k)];
+    corners.at(k) = {p.x(), p.y(), p.z()};
+  }
+  std::sort(corners.begin(), corners.end());
+  std::array<float, 9> sorted{};
+  for (std::size_t k = 0; k < 9; ++k) {
+    sorted.at(k) = corners.at(k / 3).at(k % 3);
+  }
+  return sorted;
+}
+
+void SceneBuilder::MoveAlongNormal(std::size_t triangle, float distance_m) {
+  const auto& [a, b, c] = mesh_.triangles[triangle];
+  const Eigen::Vector3f p_WA = mesh_.positions[a];
+  const Eigen::Vector3f shift =
+      distance_m * (mesh_.positions[b] - p_WA).cross(mesh_.positions[c] - p_WA).normalized();
+  for (const std::uint32_t vertex : {a, b, c}) {
+    mesh_.positions[vertex] += shift;
+  }
 }
 
 /// Boards have a front and a back in one place, each drawn from its own side. Rays would find
@@ -260,28 +308,11 @@ Result<void> SceneBuilder::AddObject(std::size_t index) {
 void SceneBuilder::SeparateCoincident() {
   std::map<std::array<float, 9>, std::vector<std::size_t>> triangles_at;
   for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
-    std::array<std::array<float, 3>, 3> corners{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Eigen::Vector3f& p = mesh_.positions[mesh_.triangles[i].at(k)];
-      corners.at(k) = {p.x(), p.y(), p.z()};
-    }
-    std::sort(corners.begin(), corners.end());
-    std::array<float, 9> key{};
-    for (std::size_t k = 0; k < 9; ++k) {
-      key.at(k) = corners.at(k / 3).at(k % 3);
-    }
-    triangles_at[key].push_back(i);
+    triangles_at[SortedCorners(i)].push_back(i);
   }
-  for (const auto& [key, triangles] : triangles_at) {
+  for (const auto& [corners, triangles] : triangles_at) {
     for (std::size_t n = 0; triangles.size() > 1 && n < triangles.size(); ++n) {
-      const auto& [a, b, c] = mesh_.triangles[triangles[n]];
-      const Eigen::Vector3f p_WA = mesh_.positions[a];
-      const Eigen::Vector3f normal =
-          (mesh_.positions[b] - p_WA).cross(mesh_.positions[c] - p_WA).normalized();
-      const Eigen::Vector3f shift = kCoincidenceShiftM * static_cast<float>(n + 1) * normal;
-      for (const std::uint32_t vertex : {a, b, c}) {
-        mesh_.positions[vertex] += shift;
-      }
+      MoveAlongNormal(triangles[n], kCoincidenceShiftM * static_cast<float>(n + 1));
     }
   }
 }
@@ -309,8 +340,8 @@ Mesh SceneBuilder::Part(bool with_holes) const {
 std::vector<Eigen::Vector3f> VerticesInWorld(const Ac3dModel& model) {
   std::vector<Eigen::Vector3f> vertices;
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    const auto placed = Place(model, i);
-    vertices.insert(vertices.end(), placed.positions.begin(), placed.positions.end());
+    const PlacedObject placed(model, i);
+    vertices.insert(vertices.end(), placed.positions().begin(), placed.positions().end());
   }
   return vertices;
 }
@@ -318,13 +349,9 @@ std::vector<Eigen::Vector3f> VerticesInWorld(const Ac3dModel& model) {
 std::vector<std::array<Eigen::Vector3f, 3>> TrianglesInWorld(const Ac3dModel& model) {
   std::vector<std::array<Eigen::Vector3f, 3>> triangles;
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    const auto placed = Place(model, i);
-    for (const Ac3dSurface& surface : model.objects[i].surfaces) {
-      for (const auto& [a, b, c] : TrianglesOf(surface)) {
-        triangles.push_back({placed.positions[surface.corners[a].vertex],
-                             placed.positions[surface.corners[b].vertex],
-                             placed.positions[surface.corners[c].vertex]});
-      }
+    const PlacedObject placed(model, i);
+    for (const ObjectTriangle& triangle : TrianglesOf(model.objects[i])) {
+      triangles.push_back(placed.CornersOf(triangle));
     }
   }
   return triangles;

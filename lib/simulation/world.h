@@ -29,7 +29,7 @@ class Ground {
   /// The same below something that heads so, forwards or backwards: where a road crosses itself,
   /// its direction tells the bridge from what runs below it.
   [[nodiscard]] virtual double HeightAlong(const Eigen::Vector2d& p_W,
-                                           double /*heading_W_rad*/) const {
+                                           double /*heading_rad*/) const {
     return HeightAt(p_W);
   }
 };

@@ -20,6 +20,21 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+/// From the point of the right-hand lane at `s` metres from the beginning.
+double DistanceFromLane(const Eigen::Vector2d& p_W, double s) {
+  return (TorcsTestTrack::PointAt(s, -2.5).head<2>() - p_W).norm();
+}
+
+/// Where in the right-hand lane, near `guess`, a point is.
+double NearestInLane(const Eigen::Vector2d& p_W, double guess) {
+  double best = guess;
+  for (double ahead = -3.0; ahead < 4.0; ahead += 0.02) {
+    const double s = std::fmod(guess + ahead + TorcsTestTrack::Length(), TorcsTestTrack::Length());
+    if (DistanceFromLane(p_W, s) < DistanceFromLane(p_W, best)) best = s;
+  }
+  return best;
+}
+
 TEST(ReadTorcsTrack, MakesAWorldOfATrack) {
   const TemporaryFolder root;
   TorcsTestTrack::Write(root);
@@ -35,18 +50,8 @@ TEST(ReadTorcsTrack, MakesAWorldOfATrack) {
   // The route has its lane's distance from the middle, and the ground the road's height.
   double s = 0.0;
   for (const Eigen::Vector2d& p_W : world->route.points) {
-    double nearest = 1e9;
-    double best_s = 0.0;
-    for (double ahead = -3.0; ahead < 4.0; ahead += 0.02) {
-      const double there = s + ahead + TorcsTestTrack::Length();
-      const double distance = (TorcsTestTrack::PointAt(there, -2.5).head<2>() - p_W).norm();
-      if (distance < nearest) {
-        nearest = distance;
-        best_s = there;
-      }
-    }
-    s = std::fmod(best_s, TorcsTestTrack::Length());
-    EXPECT_LT(nearest, 0.1) << s;
+    s = NearestInLane(p_W, s);
+    EXPECT_LT(DistanceFromLane(p_W, s), 0.1) << s;
     EXPECT_NEAR(world->ground->HeightAt(p_W), TorcsTestTrack::PointAt(s, 0.0).z(), 0.05) << s;
   }
   EXPECT_GT(s, TorcsTestTrack::Length() - 2.0);
