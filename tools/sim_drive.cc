@@ -302,17 +302,17 @@ Result<void> RenderImages(const Drive& drive,
                           DriveWriter& writer,
                           LiveDrive* live) {
   auto renderer = drive.MakeRenderer();
-  if (!renderer) return std::move(renderer).error();
+  if (!renderer) return writer.Incomplete(std::move(renderer).error());
   BoundedJpegEncoder encoder(setup.camera.jpeg_quality, setup.camera.max_jpeg_bytes);
   ProgressLine progress("rendering");
   const auto begin = std::chrono::steady_clock::now();
   const auto camera_at = [&](std::int64_t time_ns) { return drive.CameraAt(time_ns); };
   for (std::size_t i = 0; i < X_WCs.size(); ++i) {
     auto jpeg = encoder.Encode((*renderer)->Render(X_WCs[i].time_ns, camera_at));
-    if (!jpeg) return std::move(jpeg).error();
+    if (!jpeg) return writer.Incomplete(std::move(jpeg).error());
     if (auto ok = writer.AddImage(*jpeg); !ok) return ok;
     if (live != nullptr) {
-      if (auto ok = live->AddImage(*jpeg); !ok) return ok;
+      if (auto ok = live->AddImage(*jpeg); !ok) return writer.Incomplete(std::move(ok).error());
     }
     const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
     progress.Show(static_cast<double>(i + 1) / static_cast<double>(X_WCs.size()),

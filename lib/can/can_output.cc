@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -133,10 +134,9 @@ class ListeningOutput final : public CanOutput {
     UniqueFd fd(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
     if (!fd.valid()) return SystemError(ErrorKind::kUnavailable, "opening a unix socket");
     constexpr int kBacklog = 8;
+    DeleteIfDeserted(address);
     if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
-      return SystemError(
-          ErrorKind::kUnavailable,
-          fmt::format("making the socket {} (of a run that was killed: delete it)", path));
+      return SystemError(ErrorKind::kUnavailable, fmt::format("making the socket {}", path));
     }
     if (::listen(fd.get(), kBacklog) != 0) {
       return SystemError(ErrorKind::kUnavailable, fmt::format("listening on {}", path));
@@ -164,6 +164,19 @@ class ListeningOutput final : public CanOutput {
  private:
   ListeningOutput(std::string path, UniqueFd listener)
       : path_(std::move(path)), listener_(std::move(listener)) {}
+
+  /// Deletes a socket that a process left behind which was killed.
+  static void DeleteIfDeserted(const sockaddr_un& address) {
+    const char* const path = static_cast<const char*>(address.sun_path);
+    struct stat found {};
+    // Connecting to any other file is refused, too.
+    if (::lstat(path, &found) != 0 || !S_ISSOCK(found.st_mode)) return;
+    const UniqueFd probe(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+    const auto* const any = reinterpret_cast<const sockaddr*>(&address);
+    const bool is_deserted =
+        ::connect(probe.get(), any, sizeof(address)) != 0 && errno == ECONNREFUSED;
+    if (is_deserted) ::unlink(path);
+  }
 
   /// Whether the client is still there.
   bool SendTo(int client, const RawFrame& raw) {

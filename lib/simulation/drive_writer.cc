@@ -255,7 +255,10 @@ Result<void> DriveWriter::Finish() {
 
 Result<void> DriveWriter::Explain(Result<void> result) const {
   if (result) return result;
-  Error error = std::move(result).error();
+  return Incomplete(std::move(result).error());
+}
+
+Error DriveWriter::Incomplete(Error error) const {
   error.message += fmt::format("; the drive is not complete, {} has a part of it", partial_);
   return error;
 }

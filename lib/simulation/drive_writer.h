@@ -52,8 +52,8 @@ class DriveWriter {
   /// To be called when all images are there: writes the rest, and gives the folder its name.
   Result<void> Finish();
 
-  /// Where the data set is until Finish.
-  [[nodiscard]] const std::string& partial_folder() const { return partial_; }
+  /// What went wrong meanwhile, with where the part of the drive is that there is.
+  [[nodiscard]] Error Incomplete(Error error) const;
 
  private:
   DriveWriter(std::string folder, DriveRecord record, LogWriter log);
@@ -62,6 +62,7 @@ class DriveWriter {
   /// Messages with what the bus carried before a time.
   Result<void> LogCanBefore(std::int64_t time_ns);
   Result<void> LogImage(std::span<const std::uint8_t> jpeg);
+  /// The same with where the part is, if it failed.
   [[nodiscard]] Result<void> Explain(Result<void> result) const;
 
   std::string folder_;

@@ -101,6 +101,25 @@ TEST_F(CanOutputTest, TakesTheSocketAwayWithItself) {
   EXPECT_FALSE(std::filesystem::exists(path_));
 }
 
+TEST_F(CanOutputTest, TakesThePlaceOfASocketThatWasLeftBehind) {
+  const std::string moved = path_ + ".moved";
+  {
+    const auto killed = Listen();
+    std::filesystem::rename(path_, moved);
+  }
+  std::filesystem::rename(moved, path_);
+  const auto output = Listen();
+  CanSocket socket = Connect();
+  EXPECT_TRUE(output->Send(Frame(1)));
+  EXPECT_TRUE(socket.Receive()->has_value());
+}
+
+TEST_F(CanOutputTest, LeavesFilesAlone) {
+  const std::string file = folder_.Write("file", "x");
+  EXPECT_FALSE(CanOutput::Open("unix:" + file));
+  EXPECT_TRUE(std::filesystem::exists(file));
+}
+
 TEST_F(CanOutputTest, NamesWhatItCannotOpen) {
   const auto output = Listen();
   EXPECT_THAT(CanOutput::Open("unix:" + path_).error().message,
