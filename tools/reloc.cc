@@ -35,7 +35,7 @@ constexpr std::array<Verb, 11> kVerbs{{
     {"log", "inspect, cut, repair and export recorded logs"},
     {"eval", "compare a trajectory with the truth"},
     {"report", "a drive's errors, coverage and latencies: tables, plots, a page"},
-    {"sim", "a simulated robot's CAN frames and truth"},
+    {"sim", "a drive through a simulated world: images, CAN frames, truth"},
     {"import", "bring a public data set into our layout"},
 }};
 
