@@ -217,6 +217,15 @@ std::vector<HouseRow> RowsOfTown(const RoadNetwork& n) {
       // Gardens in the east.
       {&n.ring, kRight, 8.0, 62.0, {kCottage}, 4.5, 3.0, FrontGarden::kPicketFence, false},
       {&n.ring, kLeft, 30.0, 46.0, {kVilla}, 4.0, 3.0, FrontGarden::kHedge, false},
+      {&n.ring,
+       kRight,
+       63.0,
+       side - 44.0,
+       {kCottage, kVilla},
+       5.0,
+       4.0,
+       FrontGarden::kLowHedge,
+       false},
       // The north: open on its outer side.
       {&n.ring,
        kRight,

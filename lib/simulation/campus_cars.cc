@@ -1,5 +1,6 @@
 #include "simulation/campus_cars.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -227,12 +228,14 @@ class CarBuilder {
                         kLicencePlates.Part(plate));
   }
 
-  /// A disc that faces outwards on one side.
+  /// A disc that faces outwards on one side, without what would reach into the ground.
   void AddDisc(const Vector3f& centre, float radius, float side, std::uint32_t material) {
     constexpr int kSides = 16;
     const auto rim = [&](int i) -> Vector3f {
       const float angle = side * 2.0F * std::numbers::pi_v<float> * static_cast<float>(i) / kSides;
-      return centre + radius * Vector3f(-std::cos(angle), 0.0F, std::sin(angle));
+      Vector3f point = centre + radius * Vector3f(-std::cos(angle), 0.0F, std::sin(angle));
+      point.z() = std::max(point.z(), 0.0F);
+      return point;
     };
     for (int i = 0; i < kSides; ++i)
       builder_.AddTriangle({centre, rim(i), rim(i + 1)},

@@ -359,10 +359,33 @@ class HouseBuilder {
       if (x + width < length)
         face.AddPicture({x, x + width, eaves() - height, eaves() - 0.05F}, 0.007F, m_.stains);
     }
+    if (style_.is_attached) AddAdvertisement(face, length);
     if (random_.Chance(0.5)) {
       const float x = random_.Uniform(0.5F, length - 1.2F);
       const float z = random_.Uniform(0.6F, 2.2F);
       face.AddBox({x, -0.22F, z}, {x + 0.5F, 0.0F, z + 0.7F}, m_.metal);
+    }
+  }
+
+  /// What is painted or hung on the bare walls at the ends of rows.
+  void AddAdvertisement(Facade& face, float length) {
+    const float kind = random_.Unit();
+    const float left = random_.Uniform(0.8F, 0.3F * length);
+    if (kind < 0.4F) {
+      const float width = std::min(0.6F * length, length - left - 0.5F);
+      const float bottom = random_.Uniform(2.8F, std::max(2.9F, eaves() - 2.0F));
+      face.AddPicture({left, left + width, bottom, bottom + width / 6.0F},
+                      0.012F,
+                      m_.shop_sign,
+                      kShopSigns.Part(random_.Index(23)));
+    } else if (kind < 0.8F) {
+      const float side = random_.Uniform(1.6F, 2.4F);
+      face.AddBox(
+          {left - 0.08F, -0.06F, 1.12F}, {left + side + 0.08F, 0.0F, 1.28F + side}, m_.dark_metal);
+      face.AddPicture({left, left + side, 1.2F, 1.2F + side},
+                      0.068F,
+                      m_.posters,
+                      kPosters.Part(random_.Index(16)));
     }
   }
 

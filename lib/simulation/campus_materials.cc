@@ -170,10 +170,10 @@ void AddPictureMaterials(const TileNoise& noise,
   const int windows = AddTexture(MakeWindowPictures(noise, random.Fork(31)), scene);
   m.window = Add("window", windows, 0.9F, scene);
   m.lit_window = Add("lit window", windows, 0.9F, scene);
-  scene.materials[m.lit_window].emission = {0.55F, 0.38F, 0.19F};
+  scene.materials[m.lit_window].emission = {0.10F, 0.068F, 0.034F};
   m.shop_window =
       Add("shop window", AddTexture(MakeShopPictures(noise, random.Fork(32)), scene), 0.9F, scene);
-  scene.materials[m.shop_window].emission = {0.30F, 0.25F, 0.17F};
+  scene.materials[m.shop_window].emission = {0.07F, 0.058F, 0.04F};
   for (const std::uint32_t material : {m.window, m.lit_window, m.shop_window})
     scene.materials[material].reflectivity = kGlassReflectivity;
   m.shop_sign =

@@ -107,12 +107,14 @@ class RoadPainter {
                double above,
                const std::array<Eigen::Vector2f, 4>& uvs,
                std::uint32_t material) {
+    // Wholly on the road or wholly on the sidewalk.
+    const Eigen::Vector2d middle = 0.5 * (corners[0] + corners[2]);
+    const double level = above + (field().DistanceAt(middle) > 0.1 ? kCampusKerbHeight : 0.0);
     std::array<Eigen::Vector3f, 4> p;
-    for (std::size_t i = 0; i < 4; ++i)
-      p.at(i) = Eigen::Vector3d(corners.at(i).x(),
-                                corners.at(i).y(),
-                                ground_.terrain().HeightAt(corners.at(i)) + above)
-                    .cast<float>();
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector2d& q = corners.at(i);
+      p.at(i) = Eigen::Vector3d(q.x(), q.y(), ground_.terrain().HeightAt(q) + level).cast<float>();
+    }
     builder_.AddTriangle({p[0], p[1], p[2]}, {uvs[0], uvs[1], uvs[2]}, material);
     builder_.AddTriangle({p[0], p[2], p[3]}, {uvs[0], uvs[2], uvs[3]}, material);
   }
@@ -270,6 +272,33 @@ void AddSealedCracks(const PlaneLine& street, CampusRandom& random, RoadPainter&
   }
 }
 
+/// Covers, stains and mended places of sidewalks.
+void AddSidewalkDetails(const PlaneLine& street, CampusRandom& random, RoadPainter& painter) {
+  for (double s = random.Uniform(2.0, 6.0); s < LineLength(street); s += random.Uniform(2.0, 5.0)) {
+    const double side = random.Chance(0.5) ? 1.0 : -1.0;
+    const double across = side * (kStreetHalfWidth + random.Uniform(0.7, 1.7));
+    const double kind = random.Unit<double>();
+    const double size = random.Uniform(0.4, 0.9);
+    LinePlace place = PlaceOnLine(street, s);
+    place.p_W = PlaceBeside(street, s, across);
+    const double beside = painter.field().DistanceAt(place.p_W);
+    if (beside < 0.65 || beside > 1.8) continue;
+    if (kind < 0.3) {
+      painter.AddDetail(
+          place, {0.5 * size, 0.5 * size}, kRoadDetails.Part(0), painter.materials().road_details);
+    } else if (kind < 0.45) {
+      painter.AddDetail(place, {0.3, 0.42}, kRoadDetails.Part(1), painter.materials().road_details);
+    } else if (kind < 0.75) {
+      painter.AddDetail(place,
+                        {size, size},
+                        kRoadDetails.Part(2 + random.Index(2)),
+                        painter.materials().road_details);
+    } else {
+      painter.AddPatch(place, {size, 1.6 * size});
+    }
+  }
+}
+
 void AddDrains(const RoadNetwork& network, const PlaneLine& street, RoadPainter& painter) {
   const double length = LineLength(street);
   for (double s = 11.0; s < length - 4.0; s += 24.0) {
@@ -299,6 +328,7 @@ void AddRoadMarks(const CampusGround& ground,
   for (const PlaneLine* const street : network.Streets()) {
     AddWear(*street, random, painter);
     AddSealedCracks(*street, random, painter);
+    AddSidewalkDetails(*street, random, painter);
     AddDrains(network, *street, painter);
   }
   scene.instances.push_back({.mesh = scene.AddMesh(painter.Take())});

@@ -29,6 +29,7 @@ class SceneryBuilder {
     AddSigns();
     AddShoppingStreet();
     AddAlleyHedge();
+    AddTurningCircleFence();
     AddNorthAvenue();
     AddPark();
     AddLotBorder();
@@ -176,6 +177,28 @@ class SceneryBuilder {
                 0.0,
                 random_.Uniform(0.88F, 1.12F));
     site_.Take({.centre = p_W, .half_size = {0.5, 0.5}});
+  }
+
+  /// Back gardens behind the houses round the turning circle, which close the view.
+  void AddTurningCircleFence() {
+    constexpr double kRadius = kTurningRadius + kSidewalkWidth + 8.5;
+    const LinePlace end = PlaceOnLine(site_.network().spur, 1e9);
+    const auto at = [&end](double angle, double radius) -> Eigen::Vector2d {
+      return end.p_W + radius * (std::cos(angle) * end.forward + std::sin(angle) * end.left());
+    };
+    constexpr double kStep = 2.0 / kRadius;
+    for (double angle = -1.95; angle < 1.95; angle += kStep) {
+      if (site_.IsFree(at(angle + 0.5 * kStep, kRadius), 1.0, kSidewalkWidth + 1.0))
+        site_.PlaceFence(
+            stock_.furniture.board_fence, at(angle, kRadius), at(angle + kStep, kRadius));
+    }
+    for (double angle = -1.9; angle < 1.95; angle += 0.21) {
+      const auto kind = random_.Chance(0.5)
+                            ? TreeKind::kLime
+                            : (random_.Chance(0.5) ? TreeKind::kSpruce : TreeKind::kBirch);
+      PlaceTree(
+          kind, at(angle + random_.Uniform(-0.06, 0.06), kRadius + random_.Uniform(2.0, 7.0)), 6.0);
+    }
   }
 
   /// Equal trees before a fence all along the street: few features.
@@ -345,7 +368,7 @@ class SceneryBuilder {
     const RoadField& field = site_.field();
     const Eigen::Vector2d low = field.low().cast<double>();
     const Eigen::Vector2d high = field.high().cast<double>();
-    for (int i = 0; i < 760; ++i) {
+    for (int i = 0; i < 820; ++i) {
       const Eigen::Vector2d p_W{random_.Uniform(low.x() - 40.0, high.x() + 40.0),
                                 random_.Uniform(low.y() - 40.0, high.y() + 40.0)};
       const auto kind = std::array{TreeKind::kLime,
@@ -357,7 +380,7 @@ class SceneryBuilder {
       const float size = random_.Uniform(0.95F, 1.5F);
       const bool is_inside = p_W.x() > 0.0 && p_W.x() < site_.network().ring.front().x() &&
                              p_W.y() > 0.0 && p_W.y() < site_.network().junctions[4].y();
-      if (is_inside || !site_.IsFree(p_W, 2.0, 21.0)) continue;
+      if (is_inside || !site_.IsFree(p_W, 2.0, 14.0)) continue;
       site_.Place(random_.Pick(stock_.plants.Trees(kind)), p_W, AnyDirection(), -0.2, size);
     }
   }
