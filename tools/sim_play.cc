@@ -74,12 +74,12 @@ Result<Images> ReadImages(const std::string& folder, std::int64_t start_ns) {
   }
   const double span_s =
       static_cast<double>(images.times_ns.back() - images.times_ns.front()) * 1e-9;
-  constexpr double kOneImageRate_hz = 1.0;
+  constexpr double kOneImageRateHz = 1.0;
   images.format = {.width = dataset->intrinsics.width,
                    .height = dataset->intrinsics.height,
                    .frame_rate_hz = span_s > 0.0
                                         ? static_cast<double>(images.paths.size() - 1) / span_s
-                                        : kOneImageRate_hz};
+                                        : kOneImageRateHz};
   return images;
 }
 

@@ -16,12 +16,12 @@ namespace {
 
 /// Between the control points of the path that is driven: corners of the route are rounded over
 /// about so much, which moves a bend of 6 m radius by 6 cm.
-constexpr double kControlSpacing_m = 1.5;
-constexpr double kShortest_m = 5.0;
-constexpr double kLeastRadius_m = 2.0;  // of a small car
+constexpr double kControlSpacingM = 1.5;
+constexpr double kShortestM = 5.0;
+constexpr double kLeastRadiusM = 2.0;  // of a small car
 /// How long it stands at the begin and at the end; the first and the last part of the profile's
 /// pause are taken by smoothing.
-constexpr double kStand_s = 1.0 + SpeedProfile::kSmoothing_s;
+constexpr double kStandS = 1.0 + SpeedProfile::kSmoothingS;
 
 Error Invalid(std::string message) {
   return {ErrorKind::kInvalidInput, std::move(message)};
@@ -58,9 +58,9 @@ class RouteCurve {
  public:
   explicit RouteCurve(const Path& route) : points_(route.points), is_closed_(route.is_closed) {
     // A closed route may repeat its first point at the end, or not.
-    constexpr double kSamePlace_m = 1e-6;
+    constexpr double kSamePlaceM = 1e-6;
     const auto is_near = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-      return (a - b).norm() < kSamePlace_m;
+      return (a - b).norm() < kSamePlaceM;
     };
     points_.erase(std::unique(points_.begin(), points_.end(), is_near), points_.end());
     if (is_closed_ && points_.size() > 1 && is_near(points_.front(), points_.back()))
@@ -148,12 +148,12 @@ Result<Range> DrivenRange(const Path& route, double route_m, const DrivePlanOpti
     return Invalid(
         fmt::format("laps is {}, must be 1 on a route that does not close", options.laps));
   }
-  if (!(length_m >= kShortest_m)) {
+  if (!(length_m >= kShortestM)) {
     return Invalid(fmt::format("the drive from {} m to {} m has {:.1f} m, must have at least {} m",
                                options.begin_m,
                                end_m,
                                length_m,
-                               kShortest_m));
+                               kShortestM));
   }
   return Range{.begin_m = options.begin_m, .length_m = length_m};
 }
@@ -195,7 +195,7 @@ SmoothPath MakePath(const RouteCurve& route,
                     const Range& range,
                     const Session& session,
                     const Waves& sway) {
-  const auto spans = static_cast<int>(std::ceil(range.length_m / kControlSpacing_m));
+  const auto spans = static_cast<int>(std::ceil(range.length_m / kControlSpacingM));
   const double spacing_m = range.length_m / spans;
   std::vector<Eigen::Vector2d> controls;
   for (int i = -1; i <= spans + 1; ++i) {
@@ -211,17 +211,17 @@ SmoothPath MakePath(const RouteCurve& route,
 }
 
 Result<void> CheckCurvature(const SmoothPath& path) {
-  constexpr double kStep_m = 0.2;
-  for (double distance_m = 0.0; distance_m < path.length_m(); distance_m += kStep_m) {
+  constexpr double kStepM = 0.2;
+  for (double distance_m = 0.0; distance_m < path.length_m(); distance_m += kStepM) {
     const SmoothPath::Point at = path.At(distance_m);
-    if (std::abs(at.curvature_per_m) * kLeastRadius_m <= 1.0) continue;  // false for NaN
+    if (std::abs(at.curvature_per_m) * kLeastRadiusM <= 1.0) continue;  // false for NaN
     return Invalid(
         fmt::format("the drive turns with a radius of {:.2f} m at ({:.1f}, {:.1f}), must be at "
                     "least {} m",
                     1.0 / std::abs(at.curvature_per_m),
                     at.p_W.x(),
                     at.p_W.y(),
-                    kLeastRadius_m));
+                    kLeastRadiusM));
   }
   return {};
 }
@@ -237,7 +237,7 @@ std::vector<Halt> FindHalts(const SmoothPath& path,
                             double route_m,
                             const DrivePlanOptions& options) {
   std::vector<Halt> halts;
-  const double controls = std::ceil(range.length_m / kControlSpacing_m);
+  const double controls = std::ceil(range.length_m / kControlSpacingM);
   const auto add = [&](double place_m, double reverse_m) {
     // On a closed route the place comes once a lap.
     for (double since_m = place_m - range.begin_m; since_m < range.length_m; since_m += route_m) {
@@ -265,9 +265,9 @@ std::vector<SpeedProfile::Leg> MakeLegs(const std::vector<Halt>& halts,
   std::vector<SpeedProfile::Leg> legs;
   double at_m = 0.0;
   const auto go = [&](double to_m, double pause_s) {
-    constexpr double kNoMove_m = 0.2;
-    if (std::abs(to_m - at_m) < kNoMove_m) return;
-    pause_s = std::max(pause_s, SpeedProfile::kLeastPause_s);
+    constexpr double kNoMoveM = 0.2;
+    if (std::abs(to_m - at_m) < kNoMoveM) return;
+    pause_s = std::max(pause_s, SpeedProfile::kLeastPauseS);
     legs.push_back({.from_m = at_m, .to_m = to_m, .pause_s = pause_s});
     at_m = to_m;
   };
@@ -276,7 +276,7 @@ std::vector<SpeedProfile::Leg> MakeLegs(const std::vector<Halt>& halts,
     go(halt.distance_m, stop_s * factor(engine));
     if (halt.reverse_m > 0.0) go(halt.distance_m - halt.reverse_m, 0.0);
   }
-  go(length_m, kStand_s);
+  go(length_m, kStandS);
   return legs;
 }
 
@@ -310,7 +310,7 @@ Result<DrivePlan> DrivePlan::Create(const Path& route,
   };
   const auto halts = FindHalts(path, *range, curve.length_m(), options);
   const auto legs = MakeLegs(halts, path.length_m(), options.stop_s, engine);
-  SpeedProfile profile(kStand_s, legs, speed_limit_mps, options.limits);
+  SpeedProfile profile(kStandS, legs, speed_limit_mps, options.limits);
   return DrivePlan(std::move(path), std::move(profile));
 }
 

@@ -20,16 +20,16 @@ namespace relocd {
 namespace {
 
 /// odometryd passes frames on in batches of this length.
-constexpr std::int64_t kBatch_ns = 10'000'000;
+constexpr std::int64_t kBatchNs = 10'000'000;
 /// A simulated drive has no date: its log begins on this one, 2024-01-01.
-constexpr std::int64_t kLogBegin_us = 1'704'067'200'000'000;
+constexpr std::int64_t kLogBeginUs = 1'704'067'200'000'000;
 constexpr std::int64_t kRunId = 1;
 /// Each fifth image, as in other data sets, is for testing a map.
 constexpr std::size_t kSplitEvery = 5;
 constexpr std::size_t kSplitPlace = 2;
 
 std::int64_t LogTime_us(std::int64_t time_ns) {
-  return kLogBegin_us + time_ns / 1000;
+  return kLogBeginUs + time_ns / 1000;
 }
 
 Error FileSystemError(const std::string& doing, const std::error_code& error) {
@@ -224,9 +224,9 @@ Result<void> DriveWriter::LogImage(std::span<const std::uint8_t> jpeg) {
 Result<void> DriveWriter::LogCanBefore(std::int64_t time_ns) {
   const std::vector<CandumpRecord>& frames = record_.can_frames;
   while (can_frames_ < frames.size() && frames[can_frames_].time_ns <= time_ns) {
-    const std::int64_t batch = frames[can_frames_].time_ns / kBatch_ns;
+    const std::int64_t batch = frames[can_frames_].time_ns / kBatchNs;
     can_frames_t message{};
-    for (; can_frames_ < frames.size() && frames[can_frames_].time_ns / kBatch_ns == batch;
+    for (; can_frames_ < frames.size() && frames[can_frames_].time_ns / kBatchNs == batch;
          ++can_frames_) {
       message.frames.push_back(ToMessage(frames[can_frames_].frame));
     }

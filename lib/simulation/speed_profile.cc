@@ -10,7 +10,7 @@
 namespace relocd {
 namespace {
 
-constexpr double kStep_m = 0.1;  // finer than anything that limits the speed
+constexpr double kStepM = 0.1;  // finer than anything that limits the speed
 
 double Square(double value) {
   return value * value;
@@ -29,7 +29,7 @@ std::vector<double> LowestLimits(const SpeedProfile::Leg& leg,
     limits.push_back(std::min(limit_mps, highest_mps));
   }
   const double fastest_mps = *std::max_element(limits.begin(), limits.end());
-  const double reach_m = fastest_mps * SpeedProfile::kSmoothing_s;
+  const double reach_m = fastest_mps * SpeedProfile::kSmoothingS;
   const double step_m = std::abs(leg.to_m - leg.from_m) / static_cast<double>(steps);
   const auto reach = static_cast<std::size_t>(std::ceil(reach_m / step_m));
   std::vector<double> lowest;
@@ -70,7 +70,7 @@ SpeedProfile::SpeedProfile(double pause_s,
   Stand(pause_s);
   for (const Leg& leg : legs) {
     const double length_m = std::abs(leg.to_m - leg.from_m);
-    const auto steps = static_cast<std::size_t>(std::max(2.0, std::ceil(length_m / kStep_m)));
+    const auto steps = static_cast<std::size_t>(std::max(2.0, std::ceil(length_m / kStepM)));
     const double highest_mps =
         leg.to_m < leg.from_m ? limits.reverse_speed_mps : std::numeric_limits<double>::infinity();
     std::vector<double> speeds_mps = LowestLimits(leg, steps, speed_limit_mps, highest_mps);
@@ -124,11 +124,11 @@ SpeedProfile::Knot SpeedProfile::Sharp(double time_s) const {
 }
 
 SpeedProfile::State SpeedProfile::At(double time_s) const {
-  const Knot before = Sharp(time_s - 0.5 * kSmoothing_s);
-  const Knot after = Sharp(time_s + 0.5 * kSmoothing_s);
-  return {.distance_m = (after.integral_ms - before.integral_ms) / kSmoothing_s,
-          .speed_mps = (after.distance_m - before.distance_m) / kSmoothing_s,
-          .acceleration_mps2 = (after.speed_mps - before.speed_mps) / kSmoothing_s};
+  const Knot before = Sharp(time_s - 0.5 * kSmoothingS);
+  const Knot after = Sharp(time_s + 0.5 * kSmoothingS);
+  return {.distance_m = (after.integral_ms - before.integral_ms) / kSmoothingS,
+          .speed_mps = (after.distance_m - before.distance_m) / kSmoothingS,
+          .acceleration_mps2 = (after.speed_mps - before.speed_mps) / kSmoothingS};
 }
 
 }  // namespace relocd

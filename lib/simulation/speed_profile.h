@@ -15,7 +15,7 @@ class SpeedProfile {
   struct Leg {
     double from_m = 0.0;  ///< Where the leg before ended.
     double to_m = 0.0;
-    double pause_s = 0.0;  ///< How long it stands after it, at least kLeastPause_s.
+    double pause_s = 0.0;  ///< How long it stands after it, at least kLeastPauseS.
   };
   struct Limits {
     double acceleration_mps2 = 1.2;
@@ -29,8 +29,8 @@ class SpeedProfile {
   };
 
   /// Acceleration takes so long to build up fully.
-  static constexpr double kSmoothing_s = 0.6;
-  static constexpr double kLeastPause_s = 2.0 * kSmoothing_s;
+  static constexpr double kSmoothingS = 0.6;
+  static constexpr double kLeastPauseS = 2.0 * kSmoothingS;
 
   /// @param pause_s  how long it stands before the first leg.
   /// @param speed_limit_mps  at a distance, positive; looked at every 0.1 m, and kept there.
@@ -46,7 +46,7 @@ class SpeedProfile {
 
  private:
   /// Between knots the acceleration is constant. It jumps at them, and At gives the average over
-  /// kSmoothing_s, in which nothing does.
+  /// kSmoothingS, in which nothing does.
   struct Knot {
     double time_s = 0.0;
     double distance_m = 0.0;

@@ -10,12 +10,12 @@
 namespace relocd {
 namespace {
 
-constexpr double kRoughPitch_rad = 0.4 * std::numbers::pi / 180.0;  // rms, at a roughness of 1
-constexpr double kRoughRoll_rad = 0.4 * std::numbers::pi / 180.0;
-constexpr double kRoughHeight_m = 0.004;
+constexpr double kRoughPitchRad = 0.4 * std::numbers::pi / 180.0;  // rms, at a roughness of 1
+constexpr double kRoughRollRad = 0.4 * std::numbers::pi / 180.0;
+constexpr double kRoughHeightM = 0.004;
 /// Shorter bumps are under a tyre all at once; longer ones are the ground's own shape.
-constexpr double kShortestBump_m = 0.9;
-constexpr double kLongestBump_m = 12.0;
+constexpr double kShortestBumpM = 0.9;
+constexpr double kLongestBumpM = 12.0;
 
 }  // namespace
 
@@ -53,7 +53,7 @@ VehicleBody::VehicleBody(const DrivePlan& plan,
   std::uniform_real_distribution<double> uniform;
   for (std::size_t i = 0; i < kBumps; ++i) {
     const double part = (static_cast<double>(i) + uniform(engine)) / kBumps;
-    const double length_m = kShortestBump_m * std::pow(kLongestBump_m / kShortestBump_m, part);
+    const double length_m = kShortestBumpM * std::pow(kLongestBumpM / kShortestBumpM, part);
     bumps_.at(i).radians_per_m = 2.0 * std::numbers::pi / length_m;
     for (double& phase_rad : bumps_.at(i).phases_rad)
       phase_rad = 2.0 * std::numbers::pi * uniform(engine);
@@ -85,11 +85,11 @@ Pose3 VehicleBody::At(std::int64_t time_ns) const {
   // About y, which points left, a positive angle lowers the nose; about x it raises the left side.
   const double pitch_rad = std::atan2(rear_m - front_m, geometry_.wheelbase_m) -
                            options_.pitch_rad_per_mps2 * state.acceleration_mps2 +
-                           kRoughPitch_rad * rough.x();
+                           kRoughPitchRad * rough.x();
   const double roll_rad = std::atan2(left_m - right_m, geometry_.track_m) +
                           options_.roll_rad_per_mps2 * state.lateral_acceleration_mps2() +
-                          kRoughRoll_rad * rough.y();
-  const double z_m = rear_m + kRoughHeight_m * rough.z();
+                          kRoughRollRad * rough.y();
+  const double z_m = rear_m + kRoughHeightM * rough.z();
   return {RotationFromRollPitchYaw(roll_rad, pitch_rad, state.heading_rad),
           Eigen::Vector3d(state.X_WB.x(), state.X_WB.y(), z_m)};
 }

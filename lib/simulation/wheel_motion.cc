@@ -94,11 +94,11 @@ class WheelsOnPlane {
   }
 
   [[nodiscard]] WheelMotion Motion(std::int64_t time_ns) const {
-    constexpr std::int64_t kReach_ns = 1'000'000;
-    const double step_s = 2e-9 * static_cast<double>(kReach_ns);
+    constexpr std::int64_t kReachNs = 1'000'000;
+    const double step_s = 2e-9 * static_cast<double>(kReachNs);
     const auto twist_at = [&](std::int64_t at_ns) -> Eigen::Vector3d {
       const Pose2 X_BiBj =
-          trajectory_.At(at_ns - kReach_ns).Inverse() * trajectory_.At(at_ns + kReach_ns);
+          trajectory_.At(at_ns - kReachNs).Inverse() * trajectory_.At(at_ns + kReachNs);
       return X_BiBj.Log() / step_s;
     };
     const Eigen::Vector3d twist = twist_at(time_ns);
@@ -106,7 +106,7 @@ class WheelsOnPlane {
     motion.yaw_rate_radps = twist.z();
     motion.lateral_acceleration_mps2 = twist.x() * twist.z();
     motion.acceleration_mps2 =
-        (twist_at(time_ns + kReach_ns).x() - twist_at(time_ns - kReach_ns).x()) / step_s;
+        (twist_at(time_ns + kReachNs).x() - twist_at(time_ns - kReachNs).x()) / step_s;
     // A wheel that stands tells no direction.
     if (twist.x() != 0.0) motion.steering_rad = std::atan(wheelbase_m_ * twist.z() / twist.x());
     return motion;

@@ -69,9 +69,9 @@ WheelReading WheelSensors::Measure(const WheelMotion& motion) {
 
 double WheelSensors::SlipOf(std::size_t wheel, const WheelMotion& motion, double travel_m) {
   // A road changes within some metres. How much more or less it slips there no calibration finds.
-  constexpr double kGripLength_m = 10.0;
+  constexpr double kGripLengthM = 10.0;
   constexpr double kGripSigma = 0.5;
-  const double kept = std::exp(-std::abs(travel_m) / kGripLength_m);
+  const double kept = std::exp(-std::abs(travel_m) / kGripLengthM);
   double& grip = grip_.at(wheel);
   grip = kept * grip + std::sqrt(1.0 - kept * kept) * normal_(engine_);
 

@@ -15,7 +15,7 @@
 namespace relocd {
 namespace {
 
-constexpr std::int64_t kMillisecond_ns = 1'000'000;
+constexpr std::int64_t kMillisecondNs = 1'000'000;
 
 Session Calm() {
   Session session;
@@ -45,9 +45,9 @@ class DrivePlanTest : public testing::TestWithParam<int> {
 
 /// Over a step the body moves along an arc whose direction in the middle is the mean heading.
 TEST_P(DrivePlanTest, NeverMovesSideways) {
-  for (std::int64_t time_ns = 0; time_ns < plan_.duration_ns(); time_ns += 10 * kMillisecond_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan_.duration_ns(); time_ns += 10 * kMillisecondNs) {
     const DrivePlan::State from = plan_.At(time_ns);
-    const DrivePlan::State to = plan_.At(time_ns + 10 * kMillisecond_ns);
+    const DrivePlan::State to = plan_.At(time_ns + 10 * kMillisecondNs);
     const double heading_rad = 0.5 * (from.heading_rad + to.heading_rad);
     const Eigen::Vector2d moved = to.X_WB.translation() - from.X_WB.translation();
     const Eigen::Vector2d left(-std::sin(heading_rad), std::cos(heading_rad));
@@ -59,7 +59,7 @@ TEST_P(DrivePlanTest, NeverMovesSideways) {
 
 TEST_P(DrivePlanTest, KeepsItsLimits) {
   const DrivePlanOptions limits;
-  for (std::int64_t time_ns = 0; time_ns < plan_.duration_ns(); time_ns += 10 * kMillisecond_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan_.duration_ns(); time_ns += 10 * kMillisecondNs) {
     const DrivePlan::State state = plan_.At(time_ns);
     ASSERT_LE(state.speed_mps, 1.4 * limits.speed_mps + 1e-9);
     ASSERT_GE(state.speed_mps, -limits.limits.reverse_speed_mps - 1e-9);
@@ -72,10 +72,10 @@ TEST_P(DrivePlanTest, KeepsItsLimits) {
 TEST_P(DrivePlanTest, VelocityAndAccelerationDoNotJump) {
   const double step_s = 1e-3;
   double least_speed_mps = 0.0;
-  for (std::int64_t time_ns = 0; time_ns < plan_.duration_ns(); time_ns += 7 * kMillisecond_ns) {
-    const DrivePlan::State before = plan_.At(time_ns - kMillisecond_ns);
+  for (std::int64_t time_ns = 0; time_ns < plan_.duration_ns(); time_ns += 7 * kMillisecondNs) {
+    const DrivePlan::State before = plan_.At(time_ns - kMillisecondNs);
     const DrivePlan::State at = plan_.At(time_ns);
-    const DrivePlan::State after = plan_.At(time_ns + kMillisecond_ns);
+    const DrivePlan::State after = plan_.At(time_ns + kMillisecondNs);
     ASSERT_NEAR((after.travel_m - before.travel_m) / (2.0 * step_s), at.speed_mps, 1e-5);
     ASSERT_NEAR((after.speed_mps - before.speed_mps) / (2.0 * step_s), at.acceleration_mps2, 6e-3);
     // Not more than the jerk that smoothing leaves.
@@ -87,7 +87,7 @@ TEST_P(DrivePlanTest, VelocityAndAccelerationDoNotJump) {
 }
 
 TEST_P(DrivePlanTest, StandsAtBeginAndEnd) {
-  const std::int64_t second_ns = 1000 * kMillisecond_ns;
+  const std::int64_t second_ns = 1000 * kMillisecondNs;
   EXPECT_EQ(plan_.At(0).travel_m, plan_.At(second_ns).travel_m);
   const DrivePlan::State end = plan_.At(plan_.duration_ns());
   EXPECT_NEAR(plan_.At(plan_.duration_ns() - second_ns).travel_m, end.travel_m, 1e-9);
@@ -119,7 +119,7 @@ TEST(DrivePlanRouteTest, KeepsTheSessionsOffset) {
   session.lateral_offset_m = -1.0;
   const DrivePlan plan = Plan(session, {});
   double farthest_m = 0.0;
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 100 * kMillisecond_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 100 * kMillisecondNs) {
     const Eigen::Vector2d p_W = plan.At(time_ns).X_WB.translation();
     // The right side of a drive to the left is outside; the oval is 12 m from its middle line.
     const double beyond_m = std::max(0.0, std::abs(p_W.x()) - 40.0);
@@ -134,7 +134,7 @@ TEST(DrivePlanRouteTest, SwaysAsFarAsTheSessionSays) {
   const DrivePlan plan = Plan(session, {.seed = 3});
   double left_m = 0.0;
   double right_m = 0.0;
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 100 * kMillisecond_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 100 * kMillisecondNs) {
     const Eigen::Vector2d p_W = plan.At(time_ns).X_WB.translation();
     const double beyond_m = std::max(0.0, std::abs(p_W.x()) - 40.0);
     const double off_m = 12.0 - std::hypot(beyond_m, p_W.y());
@@ -152,7 +152,7 @@ TEST(DrivePlanRouteTest, StopsWhereAskedOnEachLap) {
   std::vector<double> stops_m;
   std::vector<double> stops_s;
   bool was_standing = true;
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 10 * kMillisecond_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 10 * kMillisecondNs) {
     const DrivePlan::State state = plan.At(time_ns);
     const bool stands = std::abs(state.speed_mps) < 1e-9;
     if (stands && !was_standing) {
@@ -165,7 +165,7 @@ TEST(DrivePlanRouteTest, StopsWhereAskedOnEachLap) {
   ASSERT_EQ(stops_m.size(), 3U);  // the last is the end
   EXPECT_NEAR(stops_m[0], 50.0, 0.3);
   EXPECT_NEAR(stops_m[1], 50.0 + 0.5 * plan.length_m(), 0.3);
-  EXPECT_GT(stops_s[0], 4.0 * 0.5 - SpeedProfile::kSmoothing_s);
+  EXPECT_GT(stops_s[0], 4.0 * 0.5 - SpeedProfile::kSmoothingS);
   EXPECT_LT(stops_s[0], 4.0 * 1.5);
 }
 
@@ -173,7 +173,7 @@ TEST(DrivePlanRouteTest, ReversesAsFarAsAsked) {
   const DrivePlan plan = Plan(Calm(), {.reverses_m = {60.0}, .reverse_m = 4.0});
   double farthest_m = 0.0;
   double back_m = 0.0;
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 10 * kMillisecond_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += 10 * kMillisecondNs) {
     const DrivePlan::State state = plan.At(time_ns);
     farthest_m = std::max(farthest_m, state.travel_m);
     back_m = std::max(back_m, farthest_m - state.travel_m);
@@ -193,7 +193,7 @@ TEST(DrivePlanRouteTest, DrivesAnOpenRouteFromEndToEnd) {
 }
 
 TEST(DrivePlanRouteTest, TheSeedDecides) {
-  const std::int64_t time_ns = 20'000 * kMillisecond_ns;
+  const std::int64_t time_ns = 20'000 * kMillisecondNs;
   const Session session;
   const double first_m = Plan(session, {.seed = 1}).At(time_ns).X_WB.y();
   EXPECT_EQ(first_m, Plan(session, {.seed = 1}).At(time_ns).X_WB.y());

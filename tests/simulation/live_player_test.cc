@@ -11,21 +11,21 @@
 namespace relocd {
 namespace {
 
-constexpr std::int64_t kMillisecond_ns = 1'000'000;
+constexpr std::int64_t kMillisecondNs = 1'000'000;
 constexpr Duration kMillisecond = std::chrono::milliseconds(1);
-const MonotonicTime kEpoch = FromNanoseconds(77'000 * kMillisecond_ns);
+const MonotonicTime kEpoch = FromNanoseconds(77'000 * kMillisecondNs);
 
 /// A second of frames every 10 ms and of images every 100 ms, on a clock of the test's.
 class LivePlayerTest : public testing::Test {
  protected:
   LivePlayerTest() {
     for (int i = 0; i < 100; ++i) {
-      CandumpRecord record{.time_ns = i * 10 * kMillisecond_ns, .interface = "can0"};
+      CandumpRecord record{.time_ns = i * 10 * kMillisecondNs, .interface = "can0"};
       record.frame.data[0] = static_cast<std::uint8_t>(i);
       drive_.frames.push_back(record);
     }
     for (int i = 0; i < 10; ++i)
-      drive_.image_times_ns.push_back((5 + 100 * i) * kMillisecond_ns);
+      drive_.image_times_ns.push_back((5 + 100 * i) * kMillisecondNs);
     drive_.image = [this](std::size_t i) -> Result<std::optional<std::vector<std::uint8_t>>> {
       if (now_ < kEpoch + Duration(drive_.image_times_ns[i]) + rendering_late_) {
         return std::optional<std::vector<std::uint8_t>>();

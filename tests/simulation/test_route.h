@@ -9,18 +9,18 @@ namespace relocd {
 
 /// Two straights of 80 m and two half circles of 12 m radius, to the left.
 inline Path OvalRoute() {
-  constexpr double kStraight_m = 80.0;
-  constexpr double kRadius_m = 12.0;
-  constexpr double kStep_m = 1.0;
+  constexpr double kStraightM = 80.0;
+  constexpr double kRadiusM = 12.0;
+  constexpr double kStepM = 1.0;
   Path route{.points = {}, .is_closed = true};
   const auto add_side = [&](double sign) {
-    for (double x = 0.0; x < kStraight_m; x += kStep_m)
-      route.points.emplace_back(sign * (x - 0.5 * kStraight_m), -sign * kRadius_m);
+    for (double x = 0.0; x < kStraightM; x += kStepM)
+      route.points.emplace_back(sign * (x - 0.5 * kStraightM), -sign * kRadiusM);
     constexpr int kBendSteps = 36;
     for (int i = 0; i < kBendSteps; ++i) {
       const double angle_rad = std::numbers::pi * (static_cast<double>(i) / kBendSteps - 0.5);
-      route.points.emplace_back(sign * (0.5 * kStraight_m + kRadius_m * std::cos(angle_rad)),
-                                sign * kRadius_m * std::sin(angle_rad));
+      route.points.emplace_back(sign * (0.5 * kStraightM + kRadiusM * std::cos(angle_rad)),
+                                sign * kRadiusM * std::sin(angle_rad));
     }
   };
   add_side(1.0);

@@ -12,7 +12,7 @@
 namespace relocd {
 namespace {
 
-constexpr std::int64_t kStep_ns = 20'000'000;
+constexpr std::int64_t kStepNs = 20'000'000;
 constexpr VehicleBodyOptions kStiff{
     .roughness = 0.0, .pitch_rad_per_mps2 = 0.0, .roll_rad_per_mps2 = 0.0};
 
@@ -32,7 +32,7 @@ TEST(VehicleBodyTest, LiesFlatOnFlatGround) {
   const DrivePlan plan = Plan();
   const SlopedGround ground(0.0);
   const VehicleBody body(plan, ground, {}, kStiff);
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStep_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStepNs) {
     const Pose3 error = LiftFromPlane(plan.At(time_ns).X_WB).Inverse() * body.At(time_ns);
     ASSERT_LT(error.Log().norm(), 1e-9);
   }
@@ -42,7 +42,7 @@ TEST(VehicleBodyTest, SeenFromAboveItIsThePlan) {
   const DrivePlan plan = Plan();
   const SlopedGround ground(0.03);
   const VehicleBody body(plan, ground, {}, {.seed = 4, .roughness = 5.0});
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStep_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStepNs) {
     const Pose2 error = plan.At(time_ns).X_WB.Inverse() * ProjectToPlane(body.At(time_ns));
     ASSERT_LT(error.Log().norm(), 1e-9);
   }
@@ -53,7 +53,7 @@ TEST(VehicleBodyTest, LiesAsTheSlopeDoes) {
   const double slope = 0.03;
   const SlopedGround ground(slope);
   const VehicleBody body(plan, ground, {}, kStiff);
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStep_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStepNs) {
     const Pose3 X_WB = body.At(time_ns);
     ASSERT_NEAR(X_WB.translation().z(), slope * X_WB.translation().x(), 1e-9);
     const double heading_rad = plan.At(time_ns).heading_rad;
@@ -69,7 +69,7 @@ TEST(VehicleBodyTest, NoseRisesWhenAcceleratingAndLeansOutOfBends) {
   double highest_rad = 0.0;
   double lowest_rad = 0.0;
   double leaning_rad = 0.0;
-  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStep_ns) {
+  for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStepNs) {
     const DrivePlan::State state = plan.At(time_ns);
     const Pose3 X_WB = body.At(time_ns);
     ASSERT_NEAR(NoseUp(X_WB), 0.006 * state.acceleration_mps2, 1e-9);
@@ -92,7 +92,7 @@ TEST(VehicleBodyTest, RoughGroundShakesItAsAsked) {
     double pitch_sum = 0.0;
     double roll_sum = 0.0;
     int count = 0;
-    for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStep_ns) {
+    for (std::int64_t time_ns = 0; time_ns < plan.duration_ns(); time_ns += kStepNs) {
       if (std::abs(plan.At(time_ns).speed_mps) < 1.0) continue;
       const Pose3 X_WB = body.At(time_ns);
       pitch_sum += std::pow(NoseUp(X_WB), 2.0);

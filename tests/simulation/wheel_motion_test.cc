@@ -10,7 +10,7 @@
 namespace relocd {
 namespace {
 
-constexpr std::int64_t kPeriod_ns = 10'000'000;
+constexpr std::int64_t kPeriodNs = 10'000'000;
 constexpr VehicleGeometry kGeometry{.track_m = 1.5, .wheelbase_m = 2.7};
 
 DrivePlan Plan() {
@@ -19,7 +19,7 @@ DrivePlan Plan() {
 
 TEST(WheelMotionTest, RearWheelsTravelAsTheBodyMovesAndTurns) {
   const DrivePlan plan = Plan();
-  const auto motions = RollWheels(plan, SlopedGround(0.0), kGeometry, kPeriod_ns);
+  const auto motions = RollWheels(plan, SlopedGround(0.0), kGeometry, kPeriodNs);
   ASSERT_GT(motions.size(), 3000U);
   for (const WheelMotion& motion : motions) {
     const DrivePlan::State state = plan.At(motion.time_ns);
@@ -32,7 +32,7 @@ TEST(WheelMotionTest, RearWheelsTravelAsTheBodyMovesAndTurns) {
 /// Where a bend begins, the rate over two periods is a little off.
 TEST(WheelMotionTest, SpeedsAreTheRateOfTravel) {
   for (const double slope : {0.0, 0.05}) {
-    const auto motions = RollWheels(Plan(), SlopedGround(slope), kGeometry, kPeriod_ns);
+    const auto motions = RollWheels(Plan(), SlopedGround(slope), kGeometry, kPeriodNs);
     for (std::size_t i = 1; i + 1 < motions.size(); ++i) {
       for (std::size_t wheel = 0; wheel < kWheels; ++wheel) {
         const double rate_mps =
@@ -46,7 +46,7 @@ TEST(WheelMotionTest, SpeedsAreTheRateOfTravel) {
 /// In a bend of a constant radius all wheels run on circles about the same point.
 TEST(WheelMotionTest, FrontWheelsSteerAboutTheMiddleOfTheBend) {
   const DrivePlan plan = Plan();
-  const auto motions = RollWheels(plan, SlopedGround(0.0), kGeometry, kPeriod_ns);
+  const auto motions = RollWheels(plan, SlopedGround(0.0), kGeometry, kPeriodNs);
   for (const WheelMotion& motion : motions) {
     const DrivePlan::State state = plan.At(motion.time_ns);
     if (state.curvature_per_m < 0.05) continue;
@@ -69,13 +69,13 @@ TEST(WheelMotionTest, SlopesAreLongerThanTheyLookFromAbove) {
   session.lateral_sway_m = 0.0;
   const auto plan = DrivePlan::Create(route, session, {});
   ASSERT_TRUE(plan);
-  const auto motions = RollWheels(*plan, SlopedGround(0.03), kGeometry, kPeriod_ns);
+  const auto motions = RollWheels(*plan, SlopedGround(0.03), kGeometry, kPeriodNs);
   for (const double travel_m : motions.back().travel_m)
     EXPECT_NEAR(travel_m, 100.0 * std::hypot(1.0, 0.03), 1e-6);
 }
 
 TEST(WheelMotionTest, RollsBackwardsWhenReversing) {
-  const auto motions = RollWheels(Plan(), SlopedGround(0.0), kGeometry, kPeriod_ns);
+  const auto motions = RollWheels(Plan(), SlopedGround(0.0), kGeometry, kPeriodNs);
   double least_mps = 0.0;
   for (const WheelMotion& motion : motions)
     least_mps = std::min(least_mps, motion.speeds_mps[2]);
