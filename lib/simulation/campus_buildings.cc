@@ -16,17 +16,22 @@ namespace {
 
 enum class FrontGarden { kNone, kPicketFence, kLowWall, kHedge, kLowHedge, kOpen };
 
+/// What the houses of a row have in common.
+struct RowLook {
+  std::vector<HouseKind> kinds;
+  double setback_m = 0.0;  ///< Behind the sidewalk.
+  double gap_m = 0.0;      ///< Between houses, at least.
+  FrontGarden garden = FrontGarden::kNone;
+  bool is_equal = false;  ///< All look alike.
+};
+
 /// Houses along one side of a street.
 struct HouseRow {
   const PlaneLine* street = nullptr;
   StreetSide side = StreetSide::kLeft;
   double from_m = 0.0;
   double to_m = 0.0;
-  std::vector<HouseKind> kinds;
-  double setback_m = 0.0;  ///< Behind the sidewalk.
-  double gap_m = 0.0;      ///< Between houses, at least.
-  FrontGarden garden = FrontGarden::kNone;
-  bool is_equal = false;  ///< All look alike.
+  RowLook look;
 };
 
 class RowBuilder {
@@ -44,23 +49,24 @@ class RowBuilder {
         s += 1.0;
         continue;
       }
-      if (!row.is_equal || !equal_mesh)
+      if (!row.look.is_equal || !equal_mesh)
         equal_mesh =
             site_.scene().AddMesh(MakeHouse(style, stock_.materials, random_.Fork(random_.Bits())));
       Build(row, style, *place, *equal_mesh);
-      s += style.width +
-           (style.is_attached && row.gap_m <= 0.0 ? 0.0 : row.gap_m * random_.Uniform(1.0, 1.8));
-      if (!row.is_equal) style = Draw(row);
+      s += style.width + (style.is_attached && row.look.gap_m <= 0.0
+                              ? 0.0
+                              : row.look.gap_m * random_.Uniform(1.0, 1.8));
+      if (!row.look.is_equal) style = Draw(row);
     }
   }
 
  private:
   HouseStyle Draw(const HouseRow& row) {
     HouseStyle style =
-        DrawHouseStyle(random_.Pick(row.kinds), stock_.materials, random_, site_.scene());
+        DrawHouseStyle(random_.Pick(row.look.kinds), stock_.materials, random_, site_.scene());
     // Each shop its own name as long as there are some.
     style.sign = style.ground_floor == GroundFloor::kEntrance ? 23 : next_sign_++ % 23;
-    if (row.gap_m > 0.0) style.is_attached = false;
+    if (row.look.gap_m > 0.0) style.is_attached = false;
     return style;
   }
 
@@ -73,11 +79,11 @@ class RowBuilder {
         row.side == StreetSide::kLeft ? place.left() : Eigen::Vector2d(-place.left());
     const double depth = style.depth;
     for (double more = 0.0; more < 3.2; more += 0.1) {
-      const double front = kStreetHalfWidth + kSidewalkWidth + row.setback_m + more;
+      const double front = kStreetHalfWidth + kSidewalkWidth + row.look.setback_m + more;
       SiteRectangle rectangle{.centre = place.p_W + (front + 0.5 * depth) * out,
                               .along = Eigen::Vector2d(out.y(), -out.x()),
                               .half_size = {0.5 * style.width - 0.15, 0.5 * depth}};
-      if (site_.IsFree(rectangle, kSidewalkWidth + 0.8 * row.setback_m)) return rectangle;
+      if (site_.IsFree(rectangle, kSidewalkWidth + 0.8 * row.look.setback_m)) return rectangle;
     }
     return std::nullopt;
   }
@@ -97,20 +103,20 @@ class RowBuilder {
       highest = std::max(highest, ground.HeightAt(left + part * style.width * place.along));
     const double above = highest - own - 0.06;
     site_.Place(mesh, left, place.along, above);
-    if (row.garden != FrontGarden::kNone) AddGarden(row, style, place);
+    if (row.look.garden != FrontGarden::kNone) AddGarden(row, style, place);
   }
 
   void AddGarden(const HouseRow& row, const HouseStyle& style, const SiteRectangle& place) {
     const Eigen::Vector2d to_street = -place.across();
-    const double depth = row.setback_m - 0.35;
+    const double depth = row.look.setback_m - 0.35;
     const Eigen::Vector2d front = place.centre - place.half_size.y() * place.across();
-    const double half = 0.5 * style.width + 0.4 * row.gap_m;
+    const double half = 0.5 * style.width + 0.4 * row.look.gap_m;
     const double door = static_cast<double>(DoorCentre(style)) - 0.5 * style.width;
     if (style.ground_floor == GroundFloor::kDwelling)
       AddPath(front + door * place.along, to_street, place);
     const Eigen::Vector2d edge = front + depth * to_street;
     if (site_.field().DistanceAt(edge) > kSidewalkWidth + 1.2) return;
-    const auto fence = FenceMesh(row.garden);
+    const auto fence = FenceMesh(row.look.garden);
     if (fence) {
       site_.PlaceFence(*fence, edge - half * place.along, edge + (door - 0.65) * place.along);
       site_.PlaceFence(*fence, edge + (door + 0.65) * place.along, edge + half * place.along);
@@ -128,7 +134,7 @@ class RowBuilder {
                     0.0,
                     size);
     }
-    if (row.setback_m > 3.5 && random_.Chance(0.55)) {
+    if (row.look.setback_m > 3.5 && random_.Chance(0.55)) {
       const double x = (door > 0.0 ? -0.6 : 0.6) * half;
       const auto kind = random_.Chance(0.5) ? TreeKind::kYoung : TreeKind::kBirch;
       site_.Place(random_.Pick(stock_.plants.Trees(kind)),
@@ -181,156 +187,88 @@ class RowBuilder {
   std::size_t next_sign_ = 0;
 };
 
-std::vector<HouseRow> RowsOfTown(const RoadNetwork& n) {
+/// Where streets meet others, as distances along their lines.
+struct StreetDistances {
+  explicit StreetDistances(const RoadNetwork& n)
+      : crossing(NearestDistanceAlong(n.main, {0.0, 0.0})),
+        spur(NearestDistanceAlong(n.main, n.junctions[1])),
+        corner(NearestDistanceAlong(n.main, n.junctions[2])),
+        side(NearestDistanceAlong(n.ring, n.junctions[3])),
+        west(NearestDistanceAlong(n.ring, n.junctions[5])),
+        west_crossing(NearestDistanceAlong(n.west, {0.0, 0.0})) {}
+
+  double crossing;       ///< Of `main` with `west`.
+  double spur;           ///< On `main`.
+  double corner;         ///< Of `main` with `ring`.
+  double side;           ///< Of `ring` with the street to the north.
+  double west;           ///< Of `ring` with `west`.
+  double west_crossing;  ///< Of `west` with `main`.
+};
+
+constexpr auto kLeft = StreetSide::kLeft;
+constexpr auto kRight = StreetSide::kRight;
+
+std::vector<HouseRow> RowsAlongTheRoute(const RoadNetwork& n) {
   using enum HouseKind;
-  const double crossing = NearestDistanceAlong(n.main, {0.0, 0.0});
-  const double spur = NearestDistanceAlong(n.main, n.junctions[1]);
-  const double corner = NearestDistanceAlong(n.main, n.junctions[2]);
-  const double main_end = LineLength(n.main);
-  const double side = NearestDistanceAlong(n.ring, n.junctions[3]);
-  const double west = NearestDistanceAlong(n.ring, n.junctions[5]);
-  const double ring_end = LineLength(n.ring);
-  const double west_crossing = NearestDistanceAlong(n.west, {0.0, 0.0});
-  const double west_end = LineLength(n.west);
+  using enum FrontGarden;
+  const StreetDistances at(n);
+  const RowLook shops{{kShop}, 0.0, 0.0, kNone, false};
+  const RowLook university{{kCampus}, 4.5, 3.0, kNone, false};
+  const RowLook terrace{{kTerrace}, 2.4, 0.0, kLowWall, true};
+  const RowLook garages{{kGarages}, 5.5, 1.5, kNone, true};
+  const RowLook apartments{{kApartments, kVilla}, 3.2, 3.0, kLowHedge, false};
+  const RowLook cottages{{kCottage}, 4.5, 3.0, kPicketFence, false};
+  const RowLook corner{{kCottage, kVilla}, 5.0, 4.0, kLowHedge, false};
+  const RowLook villas{{kVilla}, 4.0, 3.0, kHedge, false};
+  const RowLook mixed{{kVilla, kCottage}, 4.2, 3.5, kLowWall, false};
+  const RowLook blocks{{kVilla, kApartments}, 3.0, 3.0, kLowWall, false};
   const double spur_end = LineLength(n.spur);
-  const double side_end = LineLength(n.side_north);
-  constexpr auto kLeft = StreetSide::kLeft;
-  constexpr auto kRight = StreetSide::kRight;
   return {
-      // The shopping street.
-      {&n.main, kLeft, crossing + 8.0, spur + 6.0, {kShop}, 0.0, 0.0, FrontGarden::kNone, false},
-      {&n.main, kRight, crossing + 8.0, spur - 8.0, {kShop}, 0.0, 0.0, FrontGarden::kNone, false},
-      // The university, and what faces it.
-      {&n.main, kLeft, spur + 14.0, corner - 8.0, {kCampus}, 4.5, 3.0, FrontGarden::kNone, false},
-      {&n.main,
-       kRight,
-       spur + 8.0,
-       corner + 12.0,
-       {kApartments, kVilla},
-       3.2,
-       3.0,
-       FrontGarden::kLowHedge,
-       false},
-      // The blind alley: equal houses on one side, garages on the other.
-      {&n.spur, kLeft, 10.0, spur_end - 13.0, {kTerrace}, 2.4, 0.0, FrontGarden::kLowWall, true},
-      {&n.spur, kRight, 40.0, spur_end - 8.0, {kGarages}, 5.5, 1.5, FrontGarden::kNone, true},
-      // Gardens in the east.
-      {&n.ring, kRight, 8.0, 62.0, {kCottage}, 4.5, 3.0, FrontGarden::kPicketFence, false},
-      {&n.ring, kLeft, 30.0, 46.0, {kVilla}, 4.0, 3.0, FrontGarden::kHedge, false},
-      {&n.ring,
-       kRight,
-       63.0,
-       side - 44.0,
-       {kCottage, kVilla},
-       5.0,
-       4.0,
-       FrontGarden::kLowHedge,
-       false},
-      // The north: open on its outer side.
-      {&n.ring,
-       kRight,
-       side - 42.0,
-       side - 7.0,
-       {kVilla, kCottage},
-       4.2,
-       3.5,
-       FrontGarden::kLowWall,
-       false},
-      {&n.ring, kLeft, west - 36.0, west - 6.0, {kVilla}, 3.6, 3.0, FrontGarden::kLowHedge, false},
-      // The west.
-      {&n.west, kLeft, 8.0, west_crossing - 14.0, {kVilla}, 3.2, 2.5, FrontGarden::kHedge, false},
-      {&n.west,
-       kRight,
-       4.0,
-       west_crossing - 14.0,
-       {kVilla, kApartments},
-       3.0,
-       3.0,
-       FrontGarden::kLowWall,
-       false},
-      // Scenery along the streets that the route passes.
-      {&n.main,
-       kLeft,
-       4.0,
-       crossing - 7.0,
-       {kVilla, kShop, kApartments},
-       1.5,
-       2.0,
-       FrontGarden::kOpen,
-       false},
-      {&n.main, kRight, 4.0, crossing - 7.0, {kShop, kVilla}, 0.5, 1.0, FrontGarden::kNone, false},
-      {&n.main,
-       kLeft,
-       corner + 9.0,
-       main_end,
-       {kCottage, kVilla},
-       3.5,
-       3.0,
-       FrontGarden::kLowHedge,
-       false},
-      {&n.main,
-       kRight,
-       corner + 14.0,
-       main_end,
-       {kVilla, kCottage},
-       3.5,
-       3.0,
-       FrontGarden::kPicketFence,
-       false},
-      {&n.ring,
-       kLeft,
-       west + 9.0,
-       ring_end,
-       {kVilla, kCottage},
-       3.5,
-       3.0,
-       FrontGarden::kLowWall,
-       false},
-      {&n.ring,
-       kRight,
-       west + 12.0,
-       ring_end,
-       {kCottage},
-       4.0,
-       3.0,
-       FrontGarden::kPicketFence,
-       false},
-      {&n.west,
-       kLeft,
-       west_crossing + 9.0,
-       west_end,
-       {kTerrace, kVilla},
-       2.0,
-       1.0,
-       FrontGarden::kLowWall,
-       false},
-      {&n.west,
-       kRight,
-       west_crossing + 9.0,
-       west_end,
-       {kApartments, kVilla},
-       2.5,
-       3.0,
-       FrontGarden::kOpen,
-       false},
-      {&n.side_north,
-       kLeft,
-       8.0,
-       side_end,
-       {kCottage, kVilla},
-       3.5,
-       3.0,
-       FrontGarden::kPicketFence,
-       false},
-      {&n.side_north,
-       kRight,
-       8.0,
-       side_end,
-       {kVilla, kCottage},
-       3.5,
-       3.0,
-       FrontGarden::kLowHedge,
-       false},
+      {&n.main, kLeft, at.crossing + 8.0, at.spur + 6.0, shops},
+      {&n.main, kRight, at.crossing + 8.0, at.spur - 8.0, shops},
+      {&n.main, kLeft, at.spur + 14.0, at.corner - 8.0, university},
+      {&n.main, kRight, at.spur + 8.0, at.corner + 12.0, apartments},
+      // The blind alley: equal houses on one side, garages behind a hedge on the other.
+      {&n.spur, kLeft, 10.0, spur_end - 13.0, terrace},
+      {&n.spur, kRight, 40.0, spur_end - 8.0, garages},
+      {&n.ring, kRight, 8.0, 62.0, cottages},
+      {&n.ring, kLeft, 30.0, 46.0, villas},
+      {&n.ring, kRight, 63.0, at.side - 44.0, corner},
+      // The north is open on its outer side.
+      {&n.ring, kRight, at.side - 42.0, at.side - 7.0, mixed},
+      {&n.ring, kLeft, at.west - 36.0, at.west - 6.0, villas},
+      {&n.west, kLeft, 8.0, at.west_crossing - 14.0, villas},
+      {&n.west, kRight, 4.0, at.west_crossing - 14.0, blocks},
+  };
+}
+
+/// Along the streets that the route passes.
+std::vector<HouseRow> RowsOfSideStreets(const RoadNetwork& n) {
+  using enum HouseKind;
+  using enum FrontGarden;
+  const StreetDistances at(n);
+  const RowLook town{{kVilla, kShop, kApartments}, 1.5, 2.0, kOpen, false};
+  const RowLook shops{{kShop, kVilla}, 0.5, 1.0, kNone, false};
+  const RowLook hedges{{kCottage, kVilla}, 3.5, 3.0, kLowHedge, false};
+  const RowLook fences{{kVilla, kCottage}, 3.5, 3.0, kPicketFence, false};
+  const RowLook walls{{kVilla, kCottage}, 3.5, 3.0, kLowWall, false};
+  const RowLook terraces{{kTerrace, kVilla}, 2.0, 1.0, kLowWall, false};
+  const RowLook blocks{{kApartments, kVilla}, 2.5, 3.0, kOpen, false};
+  const double main_end = LineLength(n.main);
+  const double ring_end = LineLength(n.ring);
+  const double west_end = LineLength(n.west);
+  const double side_end = LineLength(n.side_north);
+  return {
+      {&n.main, kLeft, 4.0, at.crossing - 7.0, town},
+      {&n.main, kRight, 4.0, at.crossing - 7.0, shops},
+      {&n.main, kLeft, at.corner + 9.0, main_end, hedges},
+      {&n.main, kRight, at.corner + 14.0, main_end, fences},
+      {&n.ring, kLeft, at.west + 9.0, ring_end, walls},
+      {&n.ring, kRight, at.west + 12.0, ring_end, fences},
+      {&n.west, kLeft, at.west_crossing + 9.0, west_end, terraces},
+      {&n.west, kRight, at.west_crossing + 9.0, west_end, blocks},
+      {&n.side_north, kLeft, 8.0, side_end, fences},
+      {&n.side_north, kRight, 8.0, side_end, hedges},
   };
 }
 
@@ -348,7 +286,7 @@ void AddStreetEnd(const PlaneLine& street, HouseKind kind, RowBuilder& rows) {
   const Eigen::Vector2d middle = end.p_W + 6.0 * end.forward;
   const PlaneLine across =
       Resampled({middle + 16.0 * end.left(), middle - 16.0 * end.left()}, 1.0, false);
-  rows.Add({&across, StreetSide::kLeft, 4.0, 28.0, {kind}, 1.0, 3.0, FrontGarden::kNone, false});
+  rows.Add({&across, kLeft, 4.0, 28.0, {{kind}, 1.0, 3.0, FrontGarden::kNone, false}});
 }
 
 /// Along an arc from which houses stand as far back as along streets.
@@ -360,21 +298,19 @@ void AddHousesRoundTurningCircle(const RoadNetwork& network, RowBuilder& rows) {
                                    (std::cos(angle) * end.forward + std::sin(angle) * end.left()));
   }
   rows.Add({&arc,
-            StreetSide::kRight,
+            kRight,
             0.0,
             LineLength(arc),
-            {HouseKind::kVilla, HouseKind::kCottage},
-            3.4,
-            1.0,
-            FrontGarden::kLowHedge,
-            false});
+            {{HouseKind::kVilla, HouseKind::kCottage}, 3.4, 1.0, FrontGarden::kLowHedge, false}});
 }
 
 }  // namespace
 
 void AddBuildings(const CampusStock& stock, CampusRandom random, CampusSite& site) {
   RowBuilder rows(stock, random, site);
-  for (const HouseRow& row : RowsOfTown(site.network()))
+  for (const HouseRow& row : RowsAlongTheRoute(site.network()))
+    rows.Add(row);
+  for (const HouseRow& row : RowsOfSideStreets(site.network()))
     rows.Add(row);
   for (const auto& [street, kind] : StreetEnds(site.network()))
     AddStreetEnd(*street, kind, rows);

@@ -286,20 +286,39 @@ void FillTriangle(Canvas& canvas, const Area& area, float margin, const Paint& p
   }
 }
 
+/// A blue square with a white rim, and what is on it.
+void DrawInformationSign(Canvas& canvas, const Area& area, TrafficSign sign) {
+  const Paint white = GreyPaint(0.9F);
+  canvas.FillRectangle(
+      area.At(0.04F, 0.04F), area.At(0.96F, 0.96F), OpaquePaint(0.16F, 0.28F, 0.55F));
+  canvas.DrawFrame(area.At(0.06F, 0.06F), area.At(0.94F, 0.94F), 3.0F, white);
+  if (sign == TrafficSign::kParking) {
+    const Lettering letters{.height = 70.0F, .stroke = 12.0F, .paint = white};
+    DrawTextWithin("P", area.At(0.12F, 0.3F), area.At(0.88F, 0.7F), letters, canvas);
+  } else if (sign == TrafficSign::kDeadEnd) {
+    canvas.FillRectangle(area.At(0.42F, 0.3F), area.At(0.58F, 0.9F), white);
+    canvas.FillRectangle(
+        area.At(0.22F, 0.16F), area.At(0.78F, 0.3F), OpaquePaint(0.66F, 0.15F, 0.14F));
+  } else {
+    for (const float x : {0.2F, 0.4F, 0.6F, 0.8F})
+      canvas.DrawStroke(area.At(x, 0.75F), area.At(0.5F + 0.7F * (x - 0.5F), 0.6F), 6.0F, white);
+    canvas.FillEllipse(area.At(0.5F, 0.2F), {8.0F, 8.0F}, 0.0F, white);
+    canvas.DrawStroke(area.At(0.5F, 0.28F), area.At(0.48F, 0.48F), 9.0F, white);
+    canvas.DrawStroke(area.At(0.48F, 0.48F), area.At(0.36F, 0.68F), 6.0F, white);
+    canvas.DrawStroke(area.At(0.48F, 0.48F), area.At(0.62F, 0.68F), 6.0F, white);
+  }
+}
+
 void DrawTrafficSign(Canvas& canvas, const Area& area, TrafficSign sign) {
   const Paint red = OpaquePaint(0.66F, 0.15F, 0.14F);
-  const Paint blue = OpaquePaint(0.16F, 0.28F, 0.55F);
   const Paint white = GreyPaint(0.9F);
   const auto disc = [&](float radius, const Paint& paint) {
-    canvas.FillEllipse(
-        area.At(0.5F, 0.5F), {radius * area.size.x(), radius * area.size.x()}, 0.0F, paint);
+    const float pixels = radius * area.size.x();
+    canvas.FillEllipse(area.At(0.5F, 0.5F), {pixels, pixels}, 0.0F, paint);
   };
   const auto text = [&](std::string_view word, float height, const Paint& paint) {
-    DrawTextWithin(word,
-                   area.At(0.12F, 0.3F),
-                   area.At(0.88F, 0.7F),
-                   {.height = height, .stroke = 0.17F * height, .paint = paint},
-                   canvas);
+    const Lettering letters{.height = height, .stroke = 0.17F * height, .paint = paint};
+    DrawTextWithin(word, area.At(0.12F, 0.3F), area.At(0.88F, 0.7F), letters, canvas);
   };
   switch (sign) {
     case TrafficSign::kStop:
@@ -325,22 +344,7 @@ void DrawTrafficSign(Canvas& canvas, const Area& area, TrafficSign sign) {
       disc(0.24F, OpaquePaint(0.8F, 0.66F, 0.15F));
       break;
     default:
-      canvas.FillRectangle(area.At(0.04F, 0.04F), area.At(0.96F, 0.96F), blue);
-      canvas.DrawFrame(area.At(0.06F, 0.06F), area.At(0.94F, 0.94F), 3.0F, white);
-      if (sign == TrafficSign::kParking) text("P", 70.0F, white);
-      if (sign == TrafficSign::kDeadEnd) {
-        canvas.FillRectangle(area.At(0.42F, 0.3F), area.At(0.58F, 0.9F), white);
-        canvas.FillRectangle(area.At(0.22F, 0.16F), area.At(0.78F, 0.3F), red);
-      }
-      if (sign == TrafficSign::kCrossing) {
-        for (const float x : {0.2F, 0.4F, 0.6F, 0.8F})
-          canvas.DrawStroke(
-              area.At(x, 0.75F), area.At(0.5F + 0.7F * (x - 0.5F), 0.6F), 6.0F, white);
-        canvas.FillEllipse(area.At(0.5F, 0.2F), {8.0F, 8.0F}, 0.0F, white);
-        canvas.DrawStroke(area.At(0.5F, 0.28F), area.At(0.48F, 0.48F), 9.0F, white);
-        canvas.DrawStroke(area.At(0.48F, 0.48F), area.At(0.36F, 0.68F), 6.0F, white);
-        canvas.DrawStroke(area.At(0.48F, 0.48F), area.At(0.62F, 0.68F), 6.0F, white);
-      }
+      DrawInformationSign(canvas, area, sign);
   }
 }
 

@@ -304,7 +304,7 @@ Mesh GrowHedge(float height,
                      {0.0F, kHalfWidth - 0.12F, 0.0F},
                      Vector3f::UnitZ(),
                      core);
-  const int cards = static_cast<int>(46.0F * height);
+  const int cards = static_cast<int>(66.0F * height);
   for (int i = 0; i < cards; ++i) {
     const float x = draw.Uniform(0.0F, kLength);
     const float around = draw.Uniform(-1.0F, 1.0F);
@@ -346,7 +346,7 @@ CampusPlants MakeCampusPlants(const CampusMaterials& materials, CampusRandom ran
   constexpr std::size_t kVariants = 3;
   const std::uint32_t birch_bark =
       AddTintedMaterial("birch bark", materials.plaster_texture, {0.86F, 0.85F, 0.80F}, scene);
-  const std::uint32_t core = AddTintedMaterial("hedge core", -1, {0.13F, 0.17F, 0.10F}, scene);
+  const std::uint32_t core = AddTintedMaterial("hedge core", -1, {0.18F, 0.23F, 0.13F}, scene);
   CampusPlants plants;
   for (std::size_t kind = 0; kind < kTreeKinds; ++kind) {
     for (std::size_t variant = 0; variant < kVariants; ++variant) {

@@ -26,6 +26,7 @@ class SceneryBuilder {
     AddLamps(n.west, StreetSide::kRight);
     AddLamps(n.spur, StreetSide::kRight);
     AddLamps(n.side_north, StreetSide::kLeft);
+    AddTurningCircleLamp();
     AddSigns();
     AddShoppingStreet();
     AddAlleyHedge();
@@ -63,6 +64,12 @@ class SceneryBuilder {
       const auto place = site_.BesideStreet(street, side, s, kLampGap);
       if (place) AddLamp(*place);
     }
+  }
+
+  void AddTurningCircleLamp() {
+    const LinePlace end = PlaceOnLine(site_.network().spur, 1e9);
+    const Eigen::Vector2d p_W = end.p_W + (kTurningRadius + kLampGap) * end.forward;
+    AddLamp({p_W, -end.forward, end.left()});
   }
 
   /// Puts something at the kerb if there is room.
