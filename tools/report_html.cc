@@ -33,7 +33,7 @@ p{margin:.4rem 0}
 .wide img{display:block;width:100%;min-width:620px;height:auto;border-radius:8px}
 table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;font-size:.92rem}
 th,td{padding:.35rem .6rem;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
-th:first-child,td:first-child{text-align:left}
+th:first-child,td:first-child{text-align:left;white-space:normal;min-width:8.5rem}
 thead th{color:var(--soft);font-weight:600}
 th[colspan]{text-align:center}
 tr.fused td{font-weight:600}
