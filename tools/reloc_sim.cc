@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   for (const char* const argument : std::span(argv, static_cast<std::size_t>(argc)).subspan(1))
     command_line += fmt::format(" {}", argument);
   relocd::AddSimDrive(app, command_line, command);
+  relocd::AddSimAgain(app, command);
   relocd::AddSimWheels(app, command);
   relocd::AddSimPlay(app, command);
   relocd::AddSimView(app, command);

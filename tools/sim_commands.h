@@ -19,6 +19,9 @@ using SimCommand = std::function<Result<void>()>;
 /// @param command_line  of this run, to be kept with its results.
 void AddSimDrive(CLI::App& app, const std::string& command_line, SimCommand& command);
 
+/// `again`: some places of a drive, as another session has them.
+void AddSimAgain(CLI::App& app, SimCommand& command);
+
 /// `wheels`: the CAN frames of the wheels along a trajectory from a file.
 void AddSimWheels(CLI::App& app, SimCommand& command);
 
