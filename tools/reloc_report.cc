@@ -61,10 +61,19 @@ Result<DriveReport> ReadDrive(const Options& options) {
   return report;
 }
 
-std::string Png(const cv::Mat& image) {
+std::string Encoded(const cv::Mat& image, const char* ending) {
+  constexpr int kQuality = 90;  // of a JPEG
   std::vector<unsigned char> bytes;
-  cv::imencode(".png", image, bytes);
+  cv::imencode(ending, image, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
   return {bytes.begin(), bytes.end()};
+}
+
+/// Lines and letters as PNG; what lies over a picture of the ground would take megabytes so.
+ReportFigure MakeFigure(const cv::Mat& light, const cv::Mat& dark, bool has_picture) {
+  const char* const ending = has_picture ? ".jpg" : ".png";
+  return {.type = has_picture ? "image/jpeg" : "image/png",
+          .light = Encoded(light, ending),
+          .dark = Encoded(dark, ending)};
 }
 
 /// The figures one below the other.
@@ -93,15 +102,14 @@ Result<void> WriteReport(const Options& options, const DriveReport& report) {
   const FigureStyle dark = FigureStyle::Dark();
   const cv::Mat drive = DrawDrive(report, top_view, light);
   const cv::Mat errors = DrawErrors(report, light);
-  const ReportFigure drive_figure{.light_png = Png(drive),
-                                  .dark_png = Png(DrawDrive(report, top_view, dark))};
-  const ReportFigure errors_figure{.light_png = Png(errors),
-                                   .dark_png = Png(DrawErrors(report, dark))};
+  const ReportFigure drive_figure =
+      MakeFigure(drive, DrawDrive(report, top_view, dark), !top_view.picture.empty());
+  const ReportFigure errors_figure = MakeFigure(errors, DrawErrors(report, dark), false);
   const std::array<std::pair<std::string, std::string>, 4> files{{
       {"report.txt", FormatReportText(report)},
       {"report.json", FormatReportJson(report)},
       {"report.html", FormatReportHtml(report, drive_figure, errors_figure, *frames)},
-      {"drive.png", Png(Stacked(drive, errors))},
+      {"drive.png", Encoded(Stacked(drive, errors), ".png")},
   }};
   for (const auto& [name, content] : files) {
     if (auto ok = WriteFileAtomically(options.out + "/" + name, content); !ok) return ok;

@@ -101,13 +101,12 @@ double HighestShown(const ErrorPair& pair, double least) {
   return highest;
 }
 
-/// From where LOCALIZATION began to speak, with a pose or without.
-Range TimeAxis(const DriveReport& report, const ErrorSeries& fused) {
+/// All of the drive, also where there was no pose.
+Range TimeAxis(const DriveReport& report) {
   constexpr double kShortestS = 1e-3;
-  const double begin_s = report.status_spans.empty()
-                             ? fused.front().time_s
-                             : Seconds(report.status_spans.front().begin_ns);
-  return {.low = begin_s, .high = std::max(begin_s + kShortestS, fused.back().time_s)};
+  const double begin_s = Seconds(report.odometry.evaluation->pairs.front().time_ns);
+  const double end_s = Seconds(report.odometry.evaluation->pairs.back().time_ns);
+  return {.low = begin_s, .high = std::max(begin_s + kShortestS, end_s)};
 }
 
 void DrawBand(Canvas& canvas,
@@ -220,7 +219,7 @@ void DrawStatuses(Canvas& canvas,
                      StatusColour(span.status, colours));
   }
   if (report.images_without_pose.empty()) return;
-  entry("| image without a pose", colours.outlier);
+  entry("| no camera pose", colours.outlier);
   for (const RowFacts& row : report.camera_rows) {
     const double time_s = Seconds(row.time_ns);
     if (row.has_pose || !time_axis.x.Contains(time_s)) continue;
@@ -243,7 +242,7 @@ cv::Mat DrawErrors(const DriveReport& report, const FigureStyle& style) {
                            .camera = HeadingSeries(report.camera)};
   constexpr double kLeastPositionM = 0.05;
   constexpr double kLeastHeadingDeg = 0.2;
-  const Range time = TimeAxis(report, positions.fused);
+  const Range time = TimeAxis(report);
   const Panel position{.box = {kLeft, kPositionTop, kPanelWidth, kPositionHeight},
                        .x = time,
                        .y = {.low = 0.0, .high = HighestShown(positions, kLeastPositionM)}};

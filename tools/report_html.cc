@@ -140,9 +140,9 @@ void AppendFigure(const ReportFigure& figure, std::string_view what, std::string
   fmt::format_to(std::back_inserter(html),
                  "<div class=\"wide\"><picture><source media=\"(prefers-color-scheme: dark)\" "
                  "srcset=\"{}\"><img alt=\"{}\" src=\"{}\"></picture></div>\n",
-                 DataUri("image/png", figure.dark_png),
+                 DataUri(figure.type, figure.dark),
                  what,
-                 DataUri("image/png", figure.light_png));
+                 DataUri(figure.type, figure.light));
 }
 
 void AppendErrorRow(const ReportRow& row, std::string& html) {

@@ -9,10 +9,11 @@
 
 namespace relocd {
 
-/// A figure for readers with a light and with a dark screen, as PNG.
+/// A figure for readers with a light and with a dark screen.
 struct ReportFigure {
-  std::string light_png;
-  std::string dark_png;
+  std::string type = "image/png";
+  std::string light;
+  std::string dark;
 };
 
 /// The report as one page that needs nothing else: no links, no scripts, pictures within.

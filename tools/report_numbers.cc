@@ -95,15 +95,21 @@ Result<void> AddCamera(const ReportTables& tables, DriveReport& report) {
   return {};
 }
 
+/// The drive is as long as there is odometry, also where there was no fused pose yet.
 void AddTruth(DriveReport& report) {
-  const Evaluation& fused = *report.fused.evaluation;
-  for (const EvaluatedPose& pose : fused.truths) {
-    if (pose.time_ns < fused.pairs.front().time_ns) continue;
-    if (pose.time_ns > fused.pairs.back().time_ns) break;
-    report.truths.push_back(pose);
+  const std::vector<PosePair>& driven = report.odometry.evaluation->pairs;
+  for (const EvaluatedPose& pose : report.odometry.evaluation->truths) {
+    if (pose.time_ns >= driven.front().time_ns && pose.time_ns <= driven.back().time_ns) {
+      report.truths.push_back(pose);
+    }
   }
-  report.duration_s = fused.duration_s;
-  report.length_m = fused.truth_length_m;
+  if (report.truths.empty()) {
+    report.truths.push_back({.time_ns = driven.front().time_ns,
+                             .X_WB = driven.front().X_WB_true,
+                             .covariance = std::nullopt});
+  }
+  report.duration_s = report.odometry.evaluation->duration_s;
+  report.length_m = report.odometry.evaluation->truth_length_m;
 }
 
 void AddSpan(const StatusSpan& span, std::vector<StatusSpan>& spans) {
@@ -167,9 +173,9 @@ Result<DriveReport> MakeDriveReport(const ReportTables& tables) {
   auto fused = Evaluate(tables.truth, tables.fused.trajectory, {});
   if (!fused) return std::move(fused).error();
   report.fused = MakeRow("fused", "fused, as published live", std::move(fused).value());
-  AddTruth(report);
   AddStatuses(tables, report);
   if (auto ok = AddOdometry(tables, report); !ok) return std::move(ok).error();
+  AddTruth(report);
   if (auto ok = AddCamera(tables, report); !ok) return std::move(ok).error();
   return report;
 }

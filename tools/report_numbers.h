@@ -62,7 +62,7 @@ struct StatusSpan {
 struct DriveReport {
   std::string title;
   std::string truth_path;
-  std::vector<EvaluatedPose> truths;  ///< While the fused pose was there.
+  std::vector<EvaluatedPose> truths;  ///< While there was odometry.
   double duration_s = 0.0;            ///< Of these.
   double length_m = 0.0;
 

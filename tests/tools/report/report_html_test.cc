@@ -98,8 +98,8 @@ std::string MakePage(const DriveReport& report) {
   pair.camera_error_m = 3.0;
   pair.fused_error_m = 0.25;
   return FormatReportHtml(report,
-                          {EncodedPicture(".png", 14), EncodedPicture(".png", 16)},
-                          {EncodedPicture(".png", 18), EncodedPicture(".png", 20)},
+                          {"image/png", EncodedPicture(".png", 14), EncodedPicture(".png", 16)},
+                          {"image/jpeg", EncodedPicture(".jpg", 18), EncodedPicture(".jpg", 20)},
                           {alone, pair});
 }
 

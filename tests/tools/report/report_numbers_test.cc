@@ -51,6 +51,17 @@ TEST(ReportNumbersTest, TheFusedPosesErrorsAreThoseThatWereMade) {
   EXPECT_NEAR(report->duration_s, 10.0, kTolerance);
 }
 
+TEST(ReportNumbersTest, TheDriveIsAllOfItAlsoWhereThereWasNoFusedPoseYet) {
+  MadeDrive drive;
+  drive.fused = MadeDrive::kPoseHeader + MadeDrive::NoPose(0, "uninitialised") +
+                MadeDrive::Pose(8, 0.1, 0.1, "ok") + MadeDrive::Pose(9, 0.1, 0.1, "ok");
+  const auto report = drive.Report();
+  ASSERT_TRUE(report);
+  EXPECT_NEAR(report->length_m, 10.0, kTolerance);
+  EXPECT_NEAR(report->duration_s, 10.0, kTolerance);
+  EXPECT_EQ(report->truths.size(), 11U);
+}
+
 TEST(ReportNumbersTest, OutliersAreCountedAndStayInTheNumbers) {
   MadeDrive drive;
   drive.camera = MadeDrive::kPoseHeader;
