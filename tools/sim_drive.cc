@@ -64,7 +64,7 @@ struct Options {
   bool no_wheel_errors = false;
   WheelSimulationOptions wheels{.radius_sigma = 1e-4,
                                 .traction_slip_per_mps2 = 0.002,
-                                .turn_slip_per_mps2 = 0.0005,
+                                .turn_slip_per_mps2 = 0.0002,
                                 .yaw_rate_bias_radps = 0.002,
                                 .yaw_rate_noise_radps = 0.001};
   LiveOptions live;
