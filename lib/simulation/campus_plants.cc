@@ -124,8 +124,8 @@ struct TreeShape {
   float crown_height = 6.0F;
   float crown_radius = 2.8F;
   int branches = 8;
-  int cards_per_branch = 34;
-  float card_half = 0.48F;
+  int cards_per_branch = 26;
+  float card_half = 0.54F;
   std::uint32_t bark = 0;
   std::uint32_t leaves = 0;
 };
@@ -219,8 +219,8 @@ TreeShape ShapeOf(TreeKind kind,
                .crown_height = 7.0F,
                .crown_radius = 2.0F,
                .branches = 9,
-               .cards_per_branch = 26,
-               .card_half = 0.42F,
+               .cards_per_branch = 20,
+               .card_half = 0.47F,
                .bark = birch_bark,
                .leaves = m.leaves[1]};
       break;
@@ -230,8 +230,8 @@ TreeShape ShapeOf(TreeKind kind,
                .crown_height = 7.0F,
                .crown_radius = 4.0F,
                .branches = 11,
-               .cards_per_branch = 36,
-               .card_half = 0.62F,
+               .cards_per_branch = 28,
+               .card_half = 0.69F,
                .bark = m.bark,
                .leaves = m.leaves[2]};
       break;
@@ -241,8 +241,8 @@ TreeShape ShapeOf(TreeKind kind,
                .crown_height = 2.9F,
                .crown_radius = 1.35F,
                .branches = 6,
-               .cards_per_branch = 20,
-               .card_half = 0.36F,
+               .cards_per_branch = 16,
+               .card_half = 0.40F,
                .bark = m.bark,
                .leaves = m.leaves[0]};
       break;
@@ -252,8 +252,8 @@ TreeShape ShapeOf(TreeKind kind,
                .crown_height = 12.0F,
                .crown_radius = 1.5F,
                .branches = 14,
-               .cards_per_branch = 22,
-               .card_half = 0.48F,
+               .cards_per_branch = 17,
+               .card_half = 0.54F,
                .bark = m.bark,
                .leaves = m.leaves[1]};
       break;

@@ -15,7 +15,7 @@
 namespace relocd {
 namespace {
 
-constexpr std::uint64_t kTowns = 40;
+constexpr std::uint64_t kTowns = 20;
 
 RoadNetwork Town(std::uint64_t seed) {
   return MakeRoadNetwork(CampusRandom(seed));
