@@ -1,6 +1,7 @@
 #include "features/gradient_histograms.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <tuple>
 
@@ -26,8 +27,26 @@ Result<void> CheckRange(const char* field, int value, int low, int high) {
                fmt::format("features.{} is {}, must be in [{}, {}]", field, value, low, high)};
 }
 
-/// Root-normalises one octave's histogram in place. @return the logarithm of its energy.
-float NormaliseHistogram(std::span<float> histogram) {
+/// The octaves in which it counts which side of an edge is the brighter one.
+constexpr int kPolarOctaves = 2;
+constexpr int kFolded = GradientMaps::kDescriptorSize / 2;
+
+/// Values of one octave in a cell's feature.
+constexpr int SizeOf(int octave) {
+  return octave < kPolarOctaves ? kDescriptor : kFolded;
+}
+
+/// Adds up what has opposite directions.
+void Fold(std::span<const float> histogram, std::span<float> folded) {
+  constexpr std::size_t kOrientations = GradientMaps::kOrientations;
+  constexpr std::size_t kHalf = kOrientations / 2;
+  for (std::size_t i = 0; i < folded.size(); ++i) {
+    const std::size_t at = i / kHalf * kOrientations + i % kHalf;
+    folded[i] = histogram[at] + histogram[at + kHalf];
+  }
+}
+
+void RootNormalise(std::span<float> histogram) {
   float energy = kNoiseEnergy;
   for (const float value : histogram) {
     energy += value;
@@ -36,7 +55,6 @@ float NormaliseHistogram(std::span<float> histogram) {
   for (float& value : histogram) {
     value = std::sqrt(value * scale);
   }
-  return std::log(energy);
 }
 
 }  // namespace
@@ -79,8 +97,16 @@ Result<std::unique_ptr<GradientHistograms>> GradientHistograms::Create(
   return std::unique_ptr<GradientHistograms>(new GradientHistograms(config));
 }
 
+int GradientHistogramsDimension(const GradientHistogramsConfig& config) {
+  int size = 0;
+  for (int octave = 0; octave < config.octaves; ++octave) {
+    size += SizeOf(octave);
+  }
+  return size;
+}
+
 int GradientHistograms::dimension() const {
-  return config_.octaves * (kDescriptor + 1);
+  return GradientHistogramsDimension(config_);
 }
 
 Result<void> GradientHistograms::Resize(const GrayImage& image, std::vector<float>& working) const {
@@ -128,14 +154,22 @@ void GradientHistograms::ExtractFromWorkingImage(std::span<const float> working,
   for (std::size_t index = 0; index < cells_.size(); ++index) {
     const Eigen::Vector2f centre = CellCentre(cells_[index]);
     features.pixels[index] = centre;
-    const std::span<float> cell = std::span(features.values).subspan(index * size, size);
-    for (int octave = 0; octave < config_.octaves; ++octave) {
-      const std::span<float> histogram = cell.subspan(
-          static_cast<std::size_t>(octave) * static_cast<std::size_t>(kDescriptor), kDescriptor);
+    Describe(centre, std::span(features.values).subspan(index * size, size));
+  }
+}
+
+void GradientHistograms::Describe(const Eigen::Vector2f& centre, std::span<float> feature) const {
+  std::array<float, GradientMaps::kDescriptorSize> histogram{};
+  for (int octave = 0; octave < config_.octaves; ++octave) {
+    const std::span<float> part = feature.first(static_cast<std::size_t>(SizeOf(octave)));
+    feature = feature.subspan(part.size());
+    if (octave < kPolarOctaves) {
+      maps_.Sample(octave, centre.x(), centre.y(), part);
+    } else {
       maps_.Sample(octave, centre.x(), centre.y(), histogram);
-      cell[static_cast<std::size_t>(config_.octaves * kDescriptor + octave)] =
-          NormaliseHistogram(histogram);
+      Fold(histogram, part);
     }
+    RootNormalise(part);
   }
 }
 

@@ -20,9 +20,15 @@ Result<void> Validate(const GradientHistogramsConfig& config);
 /// about 0.33 megapixels, which is where cells of 8 pixels pay.
 GradientHistogramsConfig GradientHistogramsForImage(int width, int height);
 
+/// Values of one cell's feature.
+int GradientHistogramsDimension(const GradientHistogramsConfig& config);
+
 /// A hand-crafted dense extractor: for every octave a DAISY descriptor of 17 points x 8
-/// orientations, divided by its sum and square-rooted (so that contrast cancels and strong edges do
-/// not drown the rest), and the logarithm of that sum.
+/// orientations, divided by its sum and square-rooted, so that contrast cancels and strong edges do
+/// not drown the rest.
+///
+/// In the coarser octaves, the 8 orientations are folded to 4: there the edges are those of houses
+/// against the sky, or of shadows, and which side is the brighter one changes with the light.
 class GradientHistograms final : public FeatureExtractor {
  public:
   /// @return kInvalidInput for a configuration that Validate refuses.
@@ -57,6 +63,9 @@ class GradientHistograms final : public FeatureExtractor {
   };
 
   explicit GradientHistograms(const GradientHistogramsConfig& config) : config_(config) {}
+
+  /// The features of one cell.
+  void Describe(const Eigen::Vector2f& centre, std::span<float> feature) const;
 
   void ChooseCells(std::size_t max_cells);
   [[nodiscard]] Eigen::Vector2f CellCentre(const Cell& cell) const;

@@ -185,7 +185,7 @@ Result<void> CheckConsistency(const SceneMap& map) {
     return must_be(
         "features.image_height", features.image_height, "camera.height", map.camera.height);
   }
-  const int dimension = features.octaves * (GradientMaps::kDescriptorSize + 1);
+  const int dimension = GradientHistogramsDimension(features);
   if (map.whitening.inputs != dimension) {
     return must_be("whitening.inputs", map.whitening.inputs, "features.octaves say", dimension);
   }

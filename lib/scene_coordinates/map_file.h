@@ -19,7 +19,7 @@
 namespace relocd {
 
 /// The version that this program writes, and the only one that it reads.
-inline constexpr std::uint32_t kMapFormatVersion = 1;
+inline constexpr std::uint32_t kMapFormatVersion = 2;
 
 /// A place of the training drive, coarse: to tell whether a region is near a pose.
 struct TrainingPose {

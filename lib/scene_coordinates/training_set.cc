@@ -175,8 +175,8 @@ std::vector<float> Preparation::Depths(
     const std::size_t distance = other > image ? other - image : image - other;
     const Pose3 X_CN = images_[image].X_WC.Inverse() * images_[other].X_WC;
     const double turn_rad = X_CN.Log().tail<3>().norm();
-    if (distance > kNeighbours || turn_rad > kMaxTurnRad ||
-        X_CN.translation().norm() < kMinBaselineM) {
+    if (images_[other].drive != images_[image].drive || distance > kNeighbours ||
+        turn_rad > kMaxTurnRad || X_CN.translation().norm() < kMinBaselineM) {
       continue;
     }
     neighbours.push_back({&extractors[other - first]->maps(), images_[other].X_WC});
@@ -214,8 +214,6 @@ cv::Matx23f Preparation::ChangeView(std::mt19937_64& engine, std::vector<float>&
   std::uniform_real_distribution<double> symmetric(-1.0, 1.0);
   const double scale = std::pow(config_.max_scale, symmetric(engine));
   const double roll_rad = config_.max_roll_rad * symmetric(engine);
-  const double contrast = std::pow(config_.max_contrast, symmetric(engine));
-  const double gamma = std::pow(config_.max_gamma, symmetric(engine));
   const double blur_px = config_.max_blur_px * std::abs(symmetric(engine));
   const double shift_u = features_.cell_stride * symmetric(engine);
   const double shift_v = features_.cell_stride * symmetric(engine);
@@ -240,10 +238,8 @@ cv::Matx23f Preparation::ChangeView(std::mt19937_64& engine, std::vector<float>&
                  cv::BORDER_REFLECT_101);
   constexpr double kLeastBlurPx = 0.3;
   if (blur_px > kLeastBlurPx) cv::GaussianBlur(warped, warped, {0, 0}, blur_px);
-  constexpr double kWhite = 255.0;
-  cv::max(warped * (1.0 / kWhite), 0.0, warped);
-  cv::pow(warped, gamma, warped);
-  warped.convertTo(image, CV_32F, kWhite * contrast);
+  warped.copyTo(image);
+  ChangeLight(config_.light, engine, features_.working_width, features_.working_height, working);
   return to_base;
 }
 

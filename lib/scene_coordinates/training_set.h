@@ -12,6 +12,7 @@
 #include "features/gradient_maps.h"
 #include "geometry/pose3.h"
 #include "scene_coordinates/bfloat16.h"
+#include "scene_coordinates/light_changes.h"
 
 namespace relocd {
 
@@ -19,6 +20,7 @@ namespace relocd {
 struct TrainingImage {
   GrayImage image;
   Pose3 X_WC;
+  int drive = 0;  ///< Depths are looked for between images of one drive, in one light.
 };
 
 /// Where a training cell looks.
@@ -45,9 +47,8 @@ struct TrainingSetConfig {
   int whitened_dimensions = 192;  ///< > 0
   double max_scale = 1.35;        ///< >= 1; copies are enlarged or reduced by up to this factor.
   double max_roll_rad = 0.12;     ///< >= 0
-  double max_contrast = 1.35;     ///< >= 1; a factor or its inverse.
-  double max_gamma = 1.5;         ///< >= 1; an exponent or its inverse.
   double max_blur_px = 1.2;       ///< >= 0; standard deviation in working pixels.
+  LightChanges light;             ///< Of the copies.
   bool measure_depth = true;      ///< Find depths between neighbouring images by their poses.
   /// Used instead of fitting one, if there is one: all regions of a map share theirs.
   const FeatureWhitening* whitening = nullptr;

@@ -40,7 +40,7 @@ double Difference(const CellFeatures& a,
                   std::size_t cell_b) {
   const auto dimension = static_cast<std::size_t>(a.dimension);
   double sum = 0.0;
-  for (std::size_t i = 0; i < dimension - 3; ++i) {
+  for (std::size_t i = 0; i < dimension; ++i) {
     const double difference = a.values[cell_a * dimension + i] - b.values[cell_b * dimension + i];
     sum += difference * difference;
   }
@@ -51,15 +51,36 @@ TEST(GradientHistogramsTest, GivesEachCellAPartOfLengthOneForEachOctave) {
   const auto extractor = TestExtractor();
   CellFeatures features;
   ASSERT_TRUE(extractor->Extract(Texture(1).Image(kWidth, kHeight), kAll, features));
-  EXPECT_EQ(extractor->dimension(), 411);
+  // 17 points of 8 orientations, and of 4 in the third octave.
+  EXPECT_EQ(extractor->dimension(), 136 + 136 + 68);
   EXPECT_EQ(features.size(), 40U * 30U);
-  for (int octave = 0; octave < 3; ++octave) {
+  std::size_t begin = 0;
+  for (const std::size_t size : {136U, 136U, 68U}) {
     double squares = 0.0;
-    for (int i = 0; i < 136; ++i) {
-      squares += std::pow(features.values[static_cast<std::size_t>(octave * 136 + i)], 2);
-    }
+    for (std::size_t i = begin; i < begin + size; ++i)
+      squares += std::pow(features.values[i], 2);
     EXPECT_NEAR(squares, 1.0, 0.05);  // less by the part that stands for noise
+    begin += size;
   }
+}
+
+TEST(GradientHistogramsTest, WhichSideIsBrighterCountsInFineOctavesOnly) {
+  const auto extractor = TestExtractor();
+  GrayImage image = Texture(6).Image(kWidth, kHeight);
+  CellFeatures features;
+  ASSERT_TRUE(extractor->Extract(image, kAll, features));
+  for (std::uint8_t& pixel : image.pixels)
+    pixel = static_cast<std::uint8_t>(255 - pixel);
+  CellFeatures inverted;
+  ASSERT_TRUE(extractor->Extract(image, kAll, inverted));
+  const auto dimension = static_cast<std::size_t>(features.dimension);
+  double fine = 0.0;
+  double coarse = 0.0;
+  for (std::size_t i = 0; i < features.values.size(); ++i) {
+    const double difference = std::abs(features.values[i] - inverted.values[i]);
+    (i % dimension < 272 ? fine : coarse) += difference;
+  }
+  EXPECT_LT(coarse, 1e-3 * fine);
 }
 
 TEST(GradientHistogramsTest, ContrastCancels) {

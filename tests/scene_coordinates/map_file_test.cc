@@ -95,7 +95,7 @@ TEST(MapFileTest, RefusesATruncatedMap) {
 TEST(MapFileTest, RefusesAnotherFormatVersion) {
   std::string bytes = SerializeMap(MakeTestMap());
   bytes[kVersionAt] = 9;
-  EXPECT_THAT(ErrorOf(bytes), StartsWith("x.relocmap: format version is 9, must be 1: "));
+  EXPECT_THAT(ErrorOf(bytes), StartsWith("x.relocmap: format version is 9, must be 2: "));
 }
 
 TEST(MapFileTest, RefusesAContentThatDoesNotMatchItsHash) {

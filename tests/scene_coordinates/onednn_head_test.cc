@@ -50,10 +50,10 @@ TEST(OnednnHeadTest, Bfloat16IsNearTheReference) {
 
 TEST(OnednnHeadTest, RunsTheWhitening) {
   const SceneMap map = MakeTestMap();
-  const std::vector<float> features = RandomFloats(std::size_t{274} * 300, 0.3, 5);
+  const std::vector<float> features = RandomFloats(std::size_t{272} * 300, 0.3, 5);
   auto network = OnednnLayers::ForWhitening(map.whitening, 1);
   ASSERT_TRUE(network);
-  EXPECT_EQ((*network)->inputs(), 274);
+  EXPECT_EQ((*network)->inputs(), 272);
   EXPECT_EQ((*network)->outputs(), 24);
   std::vector<float> whitened(std::size_t{24} * 300);
   std::vector<float> expected(whitened.size());

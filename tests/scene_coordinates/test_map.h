@@ -53,10 +53,10 @@ inline SceneMap MakeTestMap() {
   map.features.working_height = 128;
   map.features.octaves = 2;
   map.cells_per_image = 150;
-  map.whitening.inputs = 2 * (GradientMaps::kDescriptorSize + 1);
+  map.whitening.inputs = GradientHistogramsDimension(map.features);
   map.whitening.outputs = 24;
-  map.whitening.mean = RandomFloats(274, 0.1, 1);
-  map.whitening.basis = RandomFloats(std::size_t{274} * 24, 1.0, 2);
+  map.whitening.mean = RandomFloats(272, 0.1, 1);
+  map.whitening.basis = RandomFloats(std::size_t{272} * 24, 1.0, 2);
   for (float& value : map.whitening.mean)
     value = RoundToHalf(value);
   for (float& value : map.whitening.basis)
