@@ -13,6 +13,7 @@
 #include "camera/jpeg.h"
 #include "camera/pinhole_camera.h"
 #include "geometry/covariance.h"
+#include "map_route.h"
 #include "progress_line.h"
 
 namespace relocd {
@@ -25,48 +26,6 @@ Error Invalid(std::string message) {
   return {ErrorKind::kInvalidInput, std::move(message)};
 }
 
-/// Frames of one stretch of the route.
-struct RegionFrames {
-  std::vector<DatasetFrame> training;
-  std::vector<DatasetFrame> held_out;
-};
-
-/// Path length up to each frame.
-std::vector<double> TravelledMetres(const std::vector<DatasetFrame>& frames) {
-  std::vector<double> travelled = {0.0};
-  for (std::size_t index = 1; index < frames.size(); ++index) {
-    const Eigen::Vector3d step =
-        frames[index].X_WC.translation() - frames[index - 1].X_WC.translation();
-    travelled.push_back(travelled.back() + step.norm());
-  }
-  return travelled;
-}
-
-/// Divides the route into stretches of equal length with an overlap, and each one's frames into
-/// those that train and those that measure.
-std::vector<RegionFrames> DivideRoute(const std::vector<DatasetFrame>& frames,
-                                      const MapTrainingOptions& options) {
-  const std::vector<double> travelled = TravelledMetres(frames);
-  const double length = travelled.back();
-  const auto count = static_cast<std::size_t>(
-      std::max(1.0, std::ceil((length - options.region_overlap_m) / options.region_length_m)));
-  const double stretch = length / static_cast<double>(count);
-  std::vector<RegionFrames> regions(count);
-  for (std::size_t region = 0; region < count; ++region) {
-    const double begin = static_cast<double>(region) * stretch - 0.5 * options.region_overlap_m;
-    const double end = static_cast<double>(region + 1) * stretch + 0.5 * options.region_overlap_m;
-    for (std::size_t index = 0; index < frames.size(); ++index) {
-      if (travelled[index] < begin || travelled[index] > end) continue;
-      // The same frames in every region that has them, so that none is trained here and measured
-      // there.
-      const auto every = static_cast<std::size_t>(options.held_out_every);
-      const bool is_held_out = index % every == every / 2;
-      (is_held_out ? regions[region].held_out : regions[region].training).push_back(frames[index]);
-    }
-  }
-  return regions;
-}
-
 Result<void> CheckFrames(const Dataset& dataset) {
   if (dataset.frames.size() < kMinFrames) {
     return Invalid(fmt::format("{}: {} training frames, must be at least {}",
@@ -74,20 +33,26 @@ Result<void> CheckFrames(const Dataset& dataset) {
                                dataset.frames.size(),
                                kMinFrames));
   }
-  if (const double route = TravelledMetres(dataset.frames).back(); route < kMinRouteM) {
+  double route_m = 0.0;
+  for (std::size_t index = 1; index < dataset.frames.size(); ++index) {
+    route_m +=
+        (dataset.frames[index].X_WC.translation() - dataset.frames[index - 1].X_WC.translation())
+            .norm();
+  }
+  if (route_m < kMinRouteM) {
     return Invalid(fmt::format("{}: the camera travels {:.3f} m, must be at least {} m",
                                dataset.directory,
-                               route,
+                               route_m,
                                kMinRouteM));
   }
   return {};
 }
 
-Result<std::vector<TrainingImage>> LoadImages(const std::vector<DatasetFrame>& frames,
+Result<std::vector<TrainingImage>> LoadImages(const std::vector<RouteFrame>& frames,
                                               const CameraIntrinsics& camera,
                                               const Pose3& X_WD) {
   std::vector<TrainingImage> images;
-  for (const DatasetFrame& frame : frames) {
+  for (const auto& [frame, drive, along_m, is_held_out] : frames) {
     auto image = ReadGrayImage(frame.image_path);
     if (!image) return std::move(image).error();
     if (image->width != camera.width || image->height != camera.height) {
@@ -99,7 +64,7 @@ Result<std::vector<TrainingImage>> LoadImages(const std::vector<DatasetFrame>& f
                       camera.width,
                       camera.height));
     }
-    images.push_back({std::move(*image), X_WD * frame.X_WC});
+    images.push_back({std::move(*image), X_WD * frame.X_WC, static_cast<int>(drive)});
   }
   return images;
 }
@@ -222,31 +187,36 @@ Result<void> MapTrainingOptions::Validate() const {
   return {};
 }
 
-Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOptions& options) {
+Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
+                            const MapTrainingOptions& options) {
   if (auto valid = options.Validate(); !valid) return std::move(valid).error();
   const auto start = std::chrono::steady_clock::now();
-  const Dataset& dataset = selected.dataset;
-  if (auto enough = CheckFrames(dataset); !enough) return std::move(enough).error();
-  const auto R_WD = RotationToMap(dataset);
+  for (const SelectedFrames& drive : drives) {
+    if (auto enough = CheckFrames(drive.dataset); !enough) return std::move(enough).error();
+  }
+  const Dataset& first = drives.front().dataset;
+  const auto R_WD = RotationToMap(first);
   if (!R_WD) return R_WD.error();
+  const auto route = PlaceOnRoute(drives, options.held_out_every);
+  if (!route) return route.error();
 
   TrainedMap trained;
   SceneMap& map = trained.map;
-  map.camera = dataset.intrinsics;
+  map.camera = first.intrinsics;
   map.R_WD = *R_WD;
   map.features = GradientHistogramsForImage(map.camera.width, map.camera.height);
-  const std::vector<RegionFrames> regions = DivideRoute(dataset.frames, options);
   std::vector<DatasetFrame> held_out;
-  for (std::size_t index = 0; index < regions.size(); ++index) {
-    const RegionFrames& frames = regions[index];
+  for (const RegionFrames& frames :
+       DivideRoute(*route, options.region_length_m, options.region_overlap_m)) {
     const auto images =
         LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
     if (!images) return images.error();
-    auto region = TrainRegion(*images, fmt::format("region{}", index), options, map);
+    auto region = TrainRegion(*images, fmt::format("region{}", map.regions.size()), options, map);
     if (!region) return std::move(region).error();
     map.regions.push_back(std::move(*region));
     map.training.training_frames += static_cast<std::uint32_t>(frames.training.size());
-    held_out.insert(held_out.end(), frames.held_out.begin(), frames.held_out.end());
+    for (const RouteFrame& frame : frames.held_out)
+      held_out.push_back(frame.frame);
   }
 
   if (auto calibrated = CalibrateRegions(held_out, options.threads, map); !calibrated) {
@@ -257,7 +227,8 @@ Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOpt
   trained.localizations = std::move(*localizations);
   trained.held_out = MeasureErrors(map, trained.localizations);
 
-  map.training.dataset = selected.name;
+  for (const SelectedFrames& drive : drives)
+    map.training.dataset += (map.training.dataset.empty() ? "" : "+") + drive.name;
   map.training.program_version = RELOCD_VERSION;
   map.training.seed = options.seed;
   map.training.held_out_frames = static_cast<std::uint32_t>(held_out.size());

@@ -34,10 +34,13 @@ struct TrainedMap {
   std::vector<FrameLocalization> localizations;
 };
 
-/// Trains a map on the selected frames. Shows progress on stderr if that is a terminal.
+/// Trains a map on the selected frames of one or more drives along one route, such as in several
+/// kinds of light. Shows progress on stderr if that is a terminal.
 ///
+/// @param drives  at least one; the first one's frames divide the route into regions.
 /// @return kInvalidInput when the data cannot make a map: too few frames, images of another size,
-///         poses that do not move, a world whose up axis is not known.
-Result<TrainedMap> TrainMap(const SelectedFrames& selected, const MapTrainingOptions& options);
+///         poses that do not move, a world whose up axis is not known, drives elsewhere.
+Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
+                            const MapTrainingOptions& options);
 
 }  // namespace relocd

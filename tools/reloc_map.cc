@@ -100,16 +100,29 @@ std::string FormatReport(const TrainedMap& trained, const MapTrainingOptions& op
 }
 
 struct TrainCommand {
-  FrameSelection frames;
+  FrameSelection frames;  ///< Without the data set.
+  std::vector<std::string> datasets;
   std::string out;
   std::string report;
   MapTrainingOptions options;
 };
 
 Result<int> Train(const TrainCommand& command) {
-  const auto selected = SelectFrames(command.frames, SplitPart::kTrain);
-  if (!selected) return selected.error();
-  auto trained = TrainMap(*selected, command.options);
+  const bool selects = !command.frames.split.empty() || !command.frames.frames.empty();
+  if (command.datasets.size() > 1 && selects) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("--split and --frames go with one --dataset, not with {}",
+                             command.datasets.size())};
+  }
+  std::vector<SelectedFrames> drives;
+  FrameSelection selection = command.frames;
+  for (const std::string& dataset : command.datasets) {
+    selection.dataset = dataset;
+    auto selected = SelectFrames(selection, SplitPart::kTrain);
+    if (!selected) return std::move(selected).error();
+    drives.push_back(std::move(*selected));
+  }
+  auto trained = TrainMap(drives, command.options);
   if (!trained) return std::move(trained).error();
   if (auto written = WriteMap(trained->map, command.out); !written) return written.error();
   const std::string report = FormatReport(*trained, command.options);
@@ -262,7 +275,6 @@ int Finish(const Result<int>& result) {
 }
 
 void AddFrameOptions(CLI::App& command, FrameSelection& frames, const char* split_help) {
-  command.add_option("--dataset", frames.dataset, "folder of the data set")->required();
   command.add_option("--split", frames.split, split_help);
   command.add_option("--frames", frames.frames, "A:B, only frames with these indices");
 }
@@ -273,6 +285,11 @@ int Main(int argc, char** argv) {
 
   TrainCommand train;
   auto* train_app = app.add_subcommand("train", "make a map of a data set");
+  train_app
+      ->add_option("--dataset",
+                   train.datasets,
+                   "folder of the data set; more than one are drives along the route of the first")
+      ->required();
   AddFrameOptions(*train_app, train.frames, "file of the split: its train rows are used");
   train_app->add_option("--out", train.out, "the map file to write")->required();
   train_app->add_option("--threads", train.options.threads, "default 2");
@@ -286,6 +303,8 @@ int Main(int argc, char** argv) {
   LocalizeCommand localize;
   auto* localize_app = app.add_subcommand("localize", "find the images of a data set in a map");
   localize_app->add_option("--map", localize.map, "the map file")->required();
+  localize_app->add_option("--dataset", localize.frames.dataset, "folder of the data set")
+      ->required();
   AddFrameOptions(*localize_app, localize.frames, "file of the split: its test rows are used");
   localize_app->add_option("--out", localize.out, "poses.csv to write")->required();
   localize_app->add_option("--threads", localize.threads, "default 1");

@@ -84,7 +84,7 @@ TEST_F(RelocMapTest, TrainsAMapThatLocalizeAndInfoRead) {
   const Outcome info = Run("info a.relocmap --json");
   EXPECT_EQ(info.exit_code, kExitOk);
   EXPECT_THAT(info.output,
-              AllOf(HasSubstr(R"("format_version": 1)"), HasSubstr(R"("image_width": 240)")));
+              AllOf(HasSubstr(R"("format_version": 2)"), HasSubstr(R"("image_width": 240)")));
 
   ASSERT_EQ(Run(train + "b.relocmap").exit_code, kExitOk);
   EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("b.relocmap")).value());
