@@ -33,6 +33,8 @@ const std::vector<Trait>& Traits() {
        [](Session& session) { SetSun(session, -80.0, 58.0, 0.0004); }},
       {{"morning", "a low sun in the east, some haze"},
        [](Session& session) { SetSun(session, 10.0, 24.0, 0.0012); }},
+      {{"afternoon", "clear sky, the sun in the south-west"},
+       [](Session& session) { SetSun(session, -135.0, 36.0, 0.0006); }},
       {{"evening", "a low warm sun in the west"},
        [](Session& session) { SetSun(session, 170.0, 15.0, 0.0008); }},
       {{"overcast", "no sun, no shadows"},
