@@ -134,7 +134,7 @@ INSTANTIATE_TEST_SUITE_P(
                "features.octaves is 40, must be in [1, 5]"},
         Change{"OctavesAndWhitening",
                [](SceneMap& map) { map.features.octaves = 3; },
-               "whitening.inputs is 274, must be 411"},
+               "whitening.inputs is 272, must be 340"},
         Change{"ImageSize",
                [](SceneMap& map) { map.features.image_width = 320; },
                "features.image_width is 320, must be 160 as camera.width"},
