@@ -11,7 +11,7 @@ namespace relocd {
 namespace {
 
 /// A drive may be this far from the first one's route.
-constexpr double kMaxAside_m = 15.0;
+constexpr double kMaxAsideM = 15.0;
 /// How far from a place a camera may be, to be as unlike it as one that looks 1 rad aside.
 constexpr double kMetresPerRadian = 10.0;
 
@@ -85,14 +85,14 @@ Result<std::vector<RouteFrame>> PlaceOnRoute(const std::vector<SelectedFrames>& 
       const DatasetFrame& frame = dataset.frames[index];
       const std::size_t at = drive == 0 ? index : NearestFrame(route, frame.X_WC);
       const double aside_m = (route[at].X_WC.translation() - frame.X_WC.translation()).norm();
-      if (aside_m > kMaxAside_m) {
+      if (aside_m > kMaxAsideM) {
         return Invalid(
             fmt::format("{}: frame {} is {:.1f} m from the route of {}, must be within {} m",
                         dataset.directory,
                         frame.index,
                         aside_m,
                         drives.front().dataset.directory,
-                        kMaxAside_m));
+                        kMaxAsideM));
       }
       placed.push_back({.frame = frame,
                         .drive = drive,

@@ -82,26 +82,26 @@ struct Extent {
 };
 
 Extent ExtentOfRoute(const Path& route, const std::array<int, 2>& size) {
-  constexpr double kMargin_m = 25.0;
+  constexpr double kMarginM = 25.0;
   Extent extent{route.points.front(), route.points.front()};
   for (const Eigen::Vector2d& point : route.points) {
     extent.low = extent.low.cwiseMin(point);
     extent.high = extent.high.cwiseMax(point);
   }
   const Eigen::Vector2d middle = 0.5 * (extent.low + extent.high);
-  Eigen::Vector2d half = 0.5 * (extent.high - extent.low).array() + kMargin_m;
+  Eigen::Vector2d half = 0.5 * (extent.high - extent.low).array() + kMarginM;
   const double aspect = static_cast<double>(size[0]) / size[1];
   half = {std::max(half.x(), half.y() * aspect), std::max(half.y(), half.x() / aspect)};
   return {middle - half, middle + half};
 }
 
 /// From so high that lines of sight are nearly parallel. x is to the right and y up in the picture.
-constexpr double kViewHeight_m = 3000.0;
+constexpr double kViewHeightM = 3000.0;
 
 Pose3 ViewFromAbove(const World& world, const Extent& extent) {
   const Eigen::Vector2d middle = 0.5 * (extent.low + extent.high);
   return {RotationFromRollPitchYaw(std::numbers::pi, 0.0, 0.0),
-          {middle.x(), middle.y(), world.ground->HeightAt(middle) + kViewHeight_m}};
+          {middle.x(), middle.y(), world.ground->HeightAt(middle) + kViewHeightM}};
 }
 
 Result<void> WriteImage(const std::string& path, const RgbImage& image) {
@@ -143,7 +143,7 @@ Result<void> View(const Options& options) {
   const Extent extent = ExtentOfRoute(world->route, options.size);
   FrameRendererOptions camera;
   const double focal = options.from_above
-                           ? options.size[0] * kViewHeight_m / (extent.high.x() - extent.low.x())
+                           ? options.size[0] * kViewHeightM / (extent.high.x() - extent.low.x())
                            : 0.5 * options.size[0] / std::tan(0.5 * Radians(options.fov_deg));
   camera.intrinsics = {.fx = focal,
                        .fy = focal,

@@ -26,12 +26,12 @@ constexpr int kTile = 16;
 /// Textures are filtered over this part of a pixel: the several samples of one smooth as well.
 constexpr float kSharpness = 0.6F;
 /// Within this distance something is near enough to keep the sky's light away.
-constexpr float kOcclusionReach_m = 4.0F;
+constexpr float kOcclusionReachM = 4.0F;
 /// Of a square as large as the sun's disk, whose radius is 0.0047 as seen from the ground.
 constexpr float kSunSide = 0.0083F;
 /// Rays leave surfaces from this far above them, and more at large distances, where floats are
 /// coarse.
-constexpr float kLift_m = 2e-3F;
+constexpr float kLiftM = 2e-3F;
 
 /// Two unit vectors that with `axis` make a right-handed frame.
 struct Tangents {
@@ -171,9 +171,10 @@ class ImageRenderer::TileRenderer {
   struct Group {
     std::size_t begin = 0;
     std::size_t count = 0;
-    Surface surface{};  ///< Where the first of them hits; nothing if they see the sky.
-    float sun = 0.0F;   ///< Part of the sun's light that falls on it.
-    float open = 1.0F;  ///< Part of the sky's light.
+    Surface surface{};       ///< Where the first of them hits; nothing if they see the sky.
+    float sun = 0.0F;        ///< Part of the sun's light that falls on it.
+    float open = 1.0F;       ///< Part of the sky's light.
+    bool looked_up = false;  ///< Whether `open` was looked for, and may be shared.
   };
 
   void CastCameraRays(int tile_u, int tile_v) {
@@ -264,7 +265,7 @@ class ImageRenderer::TileRenderer {
   [[nodiscard]] Eigen::Vector3f Above(const Group& group, std::size_t sample) const {
     const float distance = hits_[sample].distance;
     return rays_[sample].origin + distance * rays_[sample].direction +
-           (kLift_m + 2e-5F * distance) * group.surface.geometric_normal;
+           (kLiftM + 2e-5F * distance) * group.surface.geometric_normal;
   }
 
   /// Two samples of a group look for the sun; only where they disagree do the others.
@@ -340,14 +341,20 @@ class ImageRenderer::TileRenderer {
       sun_visible_[owners_[k]] = occluded_[k] != 0 ? 0 : 1;
   }
 
-  /// One sample of each group looks for what is right above it, in one of 16 directions: the next
-  /// pixels look in the others, and what they find is shared.
+  /// One sample of each group of every other pixel looks for what is right above it, in one of 16
+  /// directions: the next pixels look in others, and what they find is shared.
   void FindOpenSky() {
     ClearSecondary();
     for (std::size_t g = 0; g < groups_.size(); ++g) {
-      const Group& group = groups_[g];
+      Group& group = groups_[g];
       if (!hits_[group.begin].is_hit()) continue;
+      if (group.surface.material->translucency > 0.0F) {
+        constexpr float kAmongLeaves = 0.75F;
+        group.open = kAmongLeaves;
+        continue;
+      }
       const auto [u, v] = PixelOf(group);
+      if ((u + v) % 2 != 0) continue;
       const Eigen::Vector3f& p_NQ =
           kSkyDirections.at(static_cast<std::size_t>(4 * (v % 4) + u % 4));
       const Tangents tangents(group.surface.geometric_normal);
@@ -355,8 +362,9 @@ class ImageRenderer::TileRenderer {
       ray.origin = Above(group, group.begin);
       ray.direction = p_NQ.x() * tangents.first + p_NQ.y() * tangents.second +
                       p_NQ.z() * group.surface.geometric_normal;
-      ray.far = kOcclusionReach_m;
+      ray.far = kOcclusionReachM;
       ray.time = rays_[group.begin].time;
+      group.looked_up = true;
       secondary_.push_back(ray);
       owners_.push_back(g);
     }
@@ -376,22 +384,23 @@ class ImageRenderer::TileRenderer {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const Group& group = groups_[g];
       shared_open_[g] = group.open;
-      if (!hits_[group.begin].is_hit()) continue;
+      if (!hits_[group.begin].is_hit() || group.surface.material->translucency > 0.0F) continue;
       const auto [u, v] = PixelOf(group);
       // The window stays within the tile, and so has each direction once.
       const int u_begin = std::clamp(u - 2, tile_u_, std::max(tile_u_, tile_u_end_ - 4));
       const int v_begin = std::clamp(v - 2, tile_v_, std::max(tile_v_, tile_v_end_ - 4));
-      float sum = group.open;
-      float count = 1.0F;
+      float sum = group.looked_up ? group.open : 0.0F;
+      float count = group.looked_up ? 1.0F : 0.0F;
       for (int row = v_begin; row < std::min(v_begin + 4, tile_v_end_); ++row) {
         for (int column = u_begin; column < std::min(u_begin + 4, tile_u_end_); ++column) {
           const std::uint32_t other = first_group_[TileIndex(column, row)];
-          if (other == kNoGroup || other == g || !AreOneSurface(group, groups_[other])) continue;
+          if (other == kNoGroup || other == g || !groups_[other].looked_up) continue;
+          if (!AreOneSurface(group, groups_[other])) continue;
           sum += groups_[other].open;
           count += 1.0F;
         }
       }
-      shared_open_[g] = sum / count;
+      if (count > 0.0F) shared_open_[g] = sum / count;
     }
     for (std::size_t g = 0; g < groups_.size(); ++g)
       groups_[g].open = shared_open_[g];
@@ -400,11 +409,11 @@ class ImageRenderer::TileRenderer {
   [[nodiscard]] bool AreOneSurface(const Group& a, const Group& b) const {
     if (!hits_[b.begin].is_hit()) return false;
     constexpr float kLeastCosine = 0.9F;
-    constexpr float kMaxStep_m = 0.05F;
+    constexpr float kMaxStepM = 0.05F;
     const Eigen::Vector3f& normal = a.surface.geometric_normal;
     return normal.dot(b.surface.geometric_normal) > kLeastCosine &&
            std::abs(normal.dot(b.surface.position - a.surface.position)) <
-               kMaxStep_m + 0.005F * hits_[a.begin].distance;
+               kMaxStepM + 0.005F * hits_[a.begin].distance;
   }
 
   [[nodiscard]] std::array<int, 2> PixelOf(const Group& group) const {

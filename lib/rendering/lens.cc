@@ -12,7 +12,7 @@ namespace {
 constexpr int kSpots = 70;
 constexpr int kDrops = 45;
 constexpr int kStreaks = 350;
-constexpr double kWiperPeriod_s = 6.0;
+constexpr double kWiperPeriodS = 6.0;
 
 Eigen::Array3f MeanOf(const LinearImage& image) {
   Eigen::Array3f sum = Eigen::Array3f::Zero();
@@ -81,7 +81,7 @@ void Lens::ApplyDirt(LinearImage& image) const {
 
 void Lens::ApplyDrops(LinearImage& image, double time_s) const {
   const LinearImage before = image;
-  const double sweeps = time_s / kWiperPeriod_s;
+  const double sweeps = time_s / kWiperPeriodS;
   const auto sweep = static_cast<std::uint64_t>(std::max(0.0, std::floor(sweeps)));
   const auto since_wiped = static_cast<float>(sweeps - std::floor(sweeps));
   const CounterRandom random(seed_ + 977 * sweep);

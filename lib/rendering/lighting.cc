@@ -11,8 +11,8 @@ namespace relocd {
 namespace {
 
 /// Beyond this, a lamp is not seen to shine.
-constexpr float kLampReach_m = 22.0F;
-constexpr float kGridCell_m = 20.0F;
+constexpr float kLampReachM = 22.0F;
+constexpr float kGridCellM = 20.0F;
 
 /// The part of the sun's light that comes through the air: Kasten and Young (1989) for the length
 /// of its way, optical depths of clear air with some aerosol.
@@ -151,15 +151,15 @@ void Lighting::SortLamps(std::span<const Lamp> lamps) {
     low = low.min(lamp.p_WL.head<2>().array());
     high = high.max(lamp.p_WL.head<2>().array());
   }
-  grid_origin_ = low - kLampReach_m;
-  const Eigen::Array2f size = (high - low + 2.0F * kLampReach_m) / kGridCell_m;
+  grid_origin_ = low - kLampReachM;
+  const Eigen::Array2f size = (high - low + 2.0F * kLampReachM) / kGridCellM;
   grid_columns_ = static_cast<int>(size.x()) + 1;
   grid_rows_ = static_cast<int>(size.y()) + 1;
   lamp_grid_.resize(static_cast<std::size_t>(grid_columns_) * static_cast<std::size_t>(grid_rows_));
   for (const Lamp& lamp : lamps) {
     const Eigen::Array2f at = lamp.p_WL.head<2>().array() - grid_origin_;
-    const Eigen::Array2i from = ((at - kLampReach_m) / kGridCell_m).floor().cast<int>().max(0);
-    const Eigen::Array2i to = ((at + kLampReach_m) / kGridCell_m).floor().cast<int>();
+    const Eigen::Array2i from = ((at - kLampReachM) / kGridCellM).floor().cast<int>().max(0);
+    const Eigen::Array2i to = ((at + kLampReachM) / kGridCellM).floor().cast<int>();
     for (int row = from.y(); row <= std::min(to.y(), grid_rows_ - 1); ++row) {
       for (int column = from.x(); column <= std::min(to.x(), grid_columns_ - 1); ++column)
         lamp_grid_[static_cast<std::size_t>(row * grid_columns_ + column)].push_back(lamp);
@@ -171,7 +171,7 @@ Eigen::Array3f Lighting::LampIrradiance(const Eigen::Vector3f& position,
                                         const Eigen::Vector3f& normal) const {
   Eigen::Array3f sum = Eigen::Array3f::Zero();
   if (lamp_grid_.empty()) return sum;
-  const Eigen::Array2f cell = (position.head<2>().array() - grid_origin_) / kGridCell_m;
+  const Eigen::Array2f cell = (position.head<2>().array() - grid_origin_) / kGridCellM;
   if (!(cell.minCoeff() >= 0.0F) || !(cell.x() < static_cast<float>(grid_columns_)) ||
       !(cell.y() < static_cast<float>(grid_rows_))) {
     return sum;
@@ -182,12 +182,12 @@ Eigen::Array3f Lighting::LampIrradiance(const Eigen::Vector3f& position,
   for (const Lamp& lamp : lamp_grid_[index]) {
     const Eigen::Vector3f to_lamp = lamp.p_WL - position;
     const float distance = to_lamp.norm();
-    if (!(distance < kLampReach_m) || !(distance > 0.0F)) continue;
+    if (!(distance < kLampReachM) || !(distance > 0.0F)) continue;
     const Eigen::Vector3f direction = to_lamp / distance;
     const float facing = std::max(normal.dot(direction), 0.0F);
     const float cone = SmoothStep(lamp.cone_cosine - 0.1F, lamp.cone_cosine + 0.25F, direction.z());
     // Fades to nothing at its reach, so that no edge is seen there.
-    const float fade = 1.0F - SmoothStep(0.6F * kLampReach_m, kLampReach_m, distance);
+    const float fade = 1.0F - SmoothStep(0.6F * kLampReachM, kLampReachM, distance);
     sum += lamp.intensity * (facing * cone * fade / (distance * distance + 0.05F));
   }
   return sum / std::numbers::pi_v<float>;

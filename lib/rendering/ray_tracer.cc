@@ -211,7 +211,6 @@ struct RayTracer::Implementation {
   RTCScene SceneOf(TracedMesh& traced) const {
     if (!traced.scene_of_mesh) {
       traced.scene_of_mesh.reset(rtcNewScene(device.get()));
-      rtcSetSceneFlags(traced.scene_of_mesh.get(), RTC_SCENE_FLAG_ROBUST);
       AttachTriangles(
           device.get(), traced.scene_of_mesh.get(), traced, Eigen::Affine3f::Identity());
       rtcCommitScene(traced.scene_of_mesh.get());
@@ -227,7 +226,6 @@ struct RayTracer::Implementation {
         ++uses[instance.mesh];
     }
     still_scene.reset(rtcNewScene(device.get()));
-    rtcSetSceneFlags(still_scene.get(), RTC_SCENE_FLAG_ROBUST);
     for (const auto& list : {instances, more}) {
       for (const MeshInstance& instance : list) {
         TracedMesh& traced = meshes[instance.mesh];
@@ -259,7 +257,8 @@ struct RayTracer::Implementation {
     }
     alignas(64) const ValidMask valid = MaskOfFirst(rays.size());
     TracingContext context = MakeContext(spread);
-    // What the caller hands over together are neighbours on the way from the camera.
+    // What the caller hands over together are neighbours on the way from the camera. (Embree 3.13
+    // must not be told so in OccludedPacket: it may then search without end.)
     context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     rtcIntersect16(valid.data(), still_scene.get(), &context.embree, &packet);
     TakeHits(packet, 0, hits);

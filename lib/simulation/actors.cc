@@ -9,8 +9,8 @@
 namespace relocd {
 namespace {
 
-constexpr double kCarSpeed_mps = 7.0;
-constexpr double kWalkingSpeed_mps = 1.4;
+constexpr double kCarSpeedMps = 7.0;
+constexpr double kWalkingSpeedMps = 1.4;
 
 /// The upright pose on the ground, tilted as the ground is between two points along x.
 Eigen::Affine3f StandOnGround(const Ground& ground, const Pose2& X_WM, double length_m) {
@@ -25,7 +25,7 @@ Eigen::Affine3f StandOnGround(const Ground& ground, const Pose2& X_WM, double le
   return result.cast<float>();
 }
 
-constexpr double kCarLength_m = 2.6;  ///< Between the axles.
+constexpr double kCarLengthM = 2.6;  ///< Between the axles.
 
 }  // namespace
 
@@ -43,18 +43,18 @@ std::vector<MeshInstance> ParkedCars(const World& world, const Session& session)
     const Pose2 X_SM(0.5 * (draw(2) - 0.5), 0.2 * (draw(3) - 0.5), 0.06 * (draw(4) - 0.5));
     const Pose2 X_WM = world.parking_spots[i] * X_SM;
     cars.push_back(
-        {.mesh = world.car_meshes[kind], .X_WM = StandOnGround(*world.ground, X_WM, kCarLength_m)});
+        {.mesh = world.car_meshes[kind], .X_WM = StandOnGround(*world.ground, X_WM, kCarLengthM)});
   }
   return cars;
 }
 
 MovingActors::MovingActors(const World& world, const Session& session, std::uint64_t seed)
     : world_(world) {
-  AddActors(world.traffic, world.car_meshes, session.cars_per_km, kCarSpeed_mps, false, seed);
+  AddActors(world.traffic, world.car_meshes, session.cars_per_km, kCarSpeedMps, false, seed);
   AddActors(world.walkways,
             world.pedestrian_meshes,
             session.pedestrians_per_km,
-            kWalkingSpeed_mps,
+            kWalkingSpeedMps,
             true,
             seed + 1);
 }
@@ -116,8 +116,8 @@ Eigen::Affine3f MovingActors::PlaceOf(const Actor& actor, double time_s) const {
       from + part * step + actor.aside_m * Eigen::Vector2d(-ahead.y(), ahead.x());
   const double direction = actor.speed_mps < 0.0 ? -1.0 : 1.0;
   const Pose2 X_WM(at.x(), at.y(), std::atan2(direction * ahead.y(), direction * ahead.x()));
-  const bool walks = std::abs(actor.speed_mps) < 0.5 * kCarSpeed_mps;
-  return StandOnGround(*world_.ground, X_WM, walks ? 0.3 : kCarLength_m);
+  const bool walks = std::abs(actor.speed_mps) < 0.5 * kCarSpeedMps;
+  return StandOnGround(*world_.ground, X_WM, walks ? 0.3 : kCarLengthM);
 }
 
 std::vector<MovingMesh> MovingActors::During(double begin_s, double end_s) const {

@@ -200,12 +200,12 @@ TEST_P(ProjectionTest, TheDepthOfAPlaneIsThatOfTheClosedForm) {
     const Eigen::Vector3d other = normal_C.cross(across);
     Scene scene;
     MeshBuilder builder;
-    constexpr double kSize_m = 400.0;
-    const Eigen::Vector3d corner_C = point_C - 0.5 * kSize_m * (across + other);
+    constexpr double kSizeM = 400.0;
+    const Eigen::Vector3d corner_C = point_C - 0.5 * kSizeM * (across + other);
     const Eigen::Matrix3d R_WC = X_WC.R();
     builder.AddQuad((X_WC * corner_C).cast<float>(),
-                    (R_WC * (kSize_m * across)).cast<float>(),
-                    (R_WC * (kSize_m * other)).cast<float>(),
+                    (R_WC * (kSizeM * across)).cast<float>(),
+                    (R_WC * (kSizeM * other)).cast<float>(),
                     AddPlain(scene, 0.5F));
     Place(scene, builder);
     Studio studio(scene, NoLight(), GetParam(), Samples(1));

@@ -67,13 +67,13 @@ TEST(MovingActorsTest, MoveSteadilyAlongTheirPathsFacingAhead) {
   const World world = StraightWorld();
   const MovingActors actors(world, Busy(), 3);
   for (double time_s = 0.0; time_s < 60.0; time_s += 0.37) {
-    constexpr double kStep_s = 0.02;
-    for (const MovingMesh& mover : actors.During(time_s, time_s + kStep_s)) {
+    constexpr double kStepS = 0.02;
+    for (const MovingMesh& mover : actors.During(time_s, time_s + kStepS)) {
       const Eigen::Vector3f begin = mover.X_WM_begin.translation();
       const Eigen::Vector3f step = mover.X_WM_end.translation() - begin;
       if (step.norm() > 10.0F) continue;  // from the path's end back to its begin
       const bool is_car = mover.mesh == world.car_meshes[0];
-      EXPECT_NEAR(step.norm() / kStep_s, is_car ? 7.0 : 1.4, is_car ? 0.05 : 0.4);
+      EXPECT_NEAR(step.norm() / kStepS, is_car ? 7.0 : 1.4, is_car ? 0.05 : 0.4);
       EXPECT_GT(mover.X_WM_begin.linear().col(0).dot(step.normalized()), 0.99F);
       EXPECT_NEAR(begin.y(), is_car ? 1.5 : 5.0, is_car ? 0.01 : 0.5);
       EXPECT_NEAR(begin.z(), 0.0, 1e-4);
