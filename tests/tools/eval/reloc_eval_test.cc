@@ -1,13 +1,10 @@
-#include <sys/wait.h>
-
-#include <array>
-#include <cstdio>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include "support/run_program.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -15,22 +12,9 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Ended {
-  int exit_code = -1;
-  std::string output;  ///< Of both streams.
-};
-
 /// Runs reloc-eval as a person would.
 Ended RunTool(const std::string& arguments) {
-  Ended ended;
-  FILE* pipe = ::popen((RELOC_EVAL " " + arguments + " 2>&1").c_str(), "r");
-  if (pipe == nullptr) return ended;
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr)
-    ended.output += buffer.data();
-  const int status = ::pclose(pipe);
-  if (WIFEXITED(status)) ended.exit_code = WEXITSTATUS(status);
-  return ended;
+  return RunProgram(RELOC_EVAL " " + arguments);
 }
 
 class RelocEvalTest : public testing::Test {

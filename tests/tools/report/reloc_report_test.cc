@@ -1,8 +1,4 @@
-#include <sys/wait.h>
-
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <string>
 
@@ -11,6 +7,7 @@
 
 #include "core/file.h"
 #include "made_drive.h"
+#include "support/run_program.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -19,22 +16,9 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-struct Ended {
-  int exit_code = -1;
-  std::string output;  ///< Of both streams.
-};
-
 /// Runs reloc-report as a person would.
 Ended RunTool(const std::string& arguments) {
-  Ended ended;
-  FILE* pipe = ::popen((RELOC_REPORT " " + arguments + " 2>&1").c_str(), "r");
-  if (pipe == nullptr) return ended;
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr)
-    ended.output += buffer.data();
-  const int status = ::pclose(pipe);
-  if (WIFEXITED(status)) ended.exit_code = WEXITSTATUS(status);
-  return ended;
+  return RunProgram(RELOC_REPORT " " + arguments);
 }
 
 class RelocReportTest : public testing::Test {

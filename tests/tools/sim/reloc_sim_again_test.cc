@@ -1,7 +1,3 @@
-#include <sys/wait.h>
-
-#include <array>
-#include <cstdio>
 #include <string>
 
 #include <fmt/format.h>
@@ -11,6 +7,7 @@
 #include "camera/dataset.h"
 #include "camera/jpeg.h"
 #include "core/file.h"
+#include "support/run_program.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -18,22 +15,9 @@ namespace {
 
 using testing::HasSubstr;
 
-struct Ended {
-  int exit_code = -1;
-  std::string output;  ///< Of both streams.
-};
-
 /// Runs reloc-sim as a person would.
 Ended RunTool(const std::string& arguments) {
-  Ended ended;
-  FILE* pipe = ::popen((RELOC_SIM " " + arguments + " 2>&1").c_str(), "r");
-  if (pipe == nullptr) return ended;
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr)
-    ended.output += buffer.data();
-  const int status = ::pclose(pipe);
-  if (WIFEXITED(status)) ended.exit_code = WEXITSTATUS(status);
-  return ended;
+  return RunProgram(RELOC_SIM " " + arguments);
 }
 
 class RelocSimAgainTest : public testing::Test {

@@ -1,8 +1,4 @@
-#include <sys/wait.h>
-
-#include <array>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <thread>
@@ -21,6 +17,7 @@
 #include "core/file.h"
 #include "odometry/wheel_odometry.h"
 #include "recording/log_reader.h"
+#include "support/run_program.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -30,22 +27,9 @@ using testing::HasSubstr;
 
 const std::string kVehicles = std::string(RELOCD_SOURCE_DIR) + "/config/vehicles/";
 
-struct Ended {
-  int exit_code = -1;
-  std::string output;  ///< Of both streams.
-};
-
 /// Runs reloc-sim as a person would.
 Ended RunTool(const std::string& arguments, const std::string& before = "") {
-  Ended ended;
-  FILE* pipe = ::popen((before + RELOC_SIM " " + arguments + " 2>&1").c_str(), "r");
-  if (pipe == nullptr) return ended;
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr)
-    ended.output += buffer.data();
-  const int status = ::pclose(pipe);
-  if (WIFEXITED(status)) ended.exit_code = WEXITSTATUS(status);
-  return ended;
+  return RunProgram(before + RELOC_SIM " " + arguments);
 }
 
 class RelocSimTest : public testing::Test {
