@@ -91,7 +91,8 @@ ImageRenderer::ImageRenderer(const PinholeCamera& camera,
       height_(camera.intrinsics().height),
       grid_side_(static_cast<int>(std::sqrt(options.samples_per_pixel))),
       pixel_spread_(static_cast<float>(1.0 / camera.intrinsics().fx)),
-      spread_(pixel_spread_ / static_cast<float>(std::max(grid_side_, 1))),
+      cell_size_(1.0F / static_cast<float>(std::max(grid_side_, 1))),
+      spread_(pixel_spread_ * cell_size_),
       tracer_(tracer),
       lighting_(lighting),
       options_(options) {
@@ -109,14 +110,6 @@ ImageRenderer::ImageRenderer(const PinholeCamera& camera,
               : Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
     }
   }
-}
-
-Eigen::Vector2f ImageRenderer::RayThrough(int u, int v, const Eigen::Vector2f& offset) const {
-  const Eigen::Vector2f high =
-      (1.0F - offset.x()) * CornerRay(u, v) + offset.x() * CornerRay(u + 1, v);
-  const Eigen::Vector2f low =
-      (1.0F - offset.x()) * CornerRay(u, v + 1) + offset.x() * CornerRay(u + 1, v + 1);
-  return (1.0F - offset.y()) * high + offset.y() * low;
 }
 
 /// Renders one tile after another; each thread has one.
@@ -186,40 +179,61 @@ class ImageRenderer::TileRenderer {
     tile_v_end_ = std::min(tile_v + kTile, renderer_.height_);
     for (int v = tile_v; v < tile_v_end_; ++v) {
       for (int u = tile_u; u < tile_u_end_; ++u) {
-        for (int s = 0; s < renderer_.options_.samples_per_pixel; ++s)
-          CastCameraRay(u, v, s);
+        CastCameraRays(PixelRays(*this, u, v));
       }
     }
   }
 
-  /// Samples of a pixel lie in the cells of a square grid, and at different times.
-  void CastCameraRay(int u, int v, int s) {
-    const int samples = renderer_.options_.samples_per_pixel;
-    const std::size_t pixel =
-        static_cast<std::size_t>(v) * static_cast<std::size_t>(renderer_.width_) +
-        static_cast<std::size_t>(u);
-    const std::uint64_t id =
-        pixel * static_cast<std::uint64_t>(samples) + static_cast<std::uint64_t>(s);
-    const Eigen::Array4f random = Random(id, kPlace);
-    Eigen::Vector2f offset = random.head<2>();
-    if (const int side = renderer_.grid_side_; s < side * side) {
-      const Eigen::Vector2f cell(static_cast<float>(s % side), static_cast<float>(s / side));
-      offset = (offset + cell) / static_cast<float>(side);
+  /// The rays of a pixel in W, to first order in the place within the pixel and in time.
+  struct PixelRays {
+    PixelRays(const TileRenderer& tile, int column, int row) : u(column), v(row) {
+      const ImageRenderer& renderer = tile.renderer_;
+      const Eigen::Vector2f& corner = renderer.CornerRay(u, v);
+      const Eigen::Vector3f p_C(corner.x(), corner.y(), 1.0F);
+      begin = tile.R_WC_begin_ * p_C;
+      turn = tile.R_WC_end_ * p_C - begin;
+      along_u = tile.R_WC_begin_.leftCols<2>() * (renderer.CornerRay(u + 1, v) - corner);
+      along_v = tile.R_WC_begin_.leftCols<2>() * (renderer.CornerRay(u, v + 1) - corner);
     }
-    const Eigen::Vector2f through = renderer_.RayThrough(u, v, offset);
-    if (!through.allFinite()) return;  // Where the lens leads no light, the image stays black.
+
+    int u;
+    int v;
+    Eigen::Vector3f begin;    ///< Through the pixel's first corner, at the sweep's begin.
+    Eigen::Vector3f turn;     ///< How it changes until the sweep's end,
+    Eigen::Vector3f along_u;  ///< and across the pixel.
+    Eigen::Vector3f along_v;
+  };
+
+  /// Samples of a pixel lie in the cells of a square grid, and at different times.
+  void CastCameraRays(const PixelRays& pixel_rays) {
+    // Where the lens leads no light, the image stays black.
+    if (!(pixel_rays.begin + pixel_rays.along_u + pixel_rays.along_v).allFinite()) return;
+    const int samples = renderer_.options_.samples_per_pixel;
+    const int side = renderer_.grid_side_;
+    const std::size_t pixel =
+        static_cast<std::size_t>(pixel_rays.v) * static_cast<std::size_t>(renderer_.width_) +
+        static_cast<std::size_t>(pixel_rays.u);
     const float row_part =
-        static_cast<float>(v) / static_cast<float>(std::max(renderer_.height_ - 1, 1));
-    const float in_exposure = (static_cast<float>(s) + random[2]) / static_cast<float>(samples);
-    Ray ray;
-    ray.time = (1.0F - exposure_part_) * row_part + exposure_part_ * in_exposure;
-    ray.origin = begin_ + ray.time * (end_ - begin_);
-    // For turns of a few degrees, as between two rows' exposures, this is as good as a rotation.
-    const Eigen::Vector3f p_C(through.x(), through.y(), 1.0F);
-    const Eigen::Vector3f begin = R_WC_begin_ * p_C;
-    ray.direction = (begin + ray.time * (R_WC_end_ * p_C - begin)).normalized();
-    rays_.push_back(ray);
-    samples_.push_back({.pixel = pixel, .id = id});
+        static_cast<float>(pixel_rays.v) / static_cast<float>(std::max(renderer_.height_ - 1, 1));
+    for (int s = 0; s < samples; ++s) {
+      const std::uint64_t id =
+          pixel * static_cast<std::uint64_t>(samples) + static_cast<std::uint64_t>(s);
+      const Eigen::Array4f random = Random(id, kPlace);
+      Eigen::Array2f offset = random.head<2>();
+      if (s < side * side) {
+        const Eigen::Array2f cell(static_cast<float>(s % side), static_cast<float>(s / side));
+        offset = (offset + cell) * renderer_.cell_size_;
+      }
+      const float in_exposure = (static_cast<float>(s) + random[2]) / static_cast<float>(samples);
+      Ray ray;
+      ray.time = (1.0F - exposure_part_) * row_part + exposure_part_ * in_exposure;
+      ray.origin = begin_ + ray.time * (end_ - begin_);
+      ray.direction = (pixel_rays.begin + ray.time * pixel_rays.turn +
+                       offset.x() * pixel_rays.along_u + offset.y() * pixel_rays.along_v)
+                          .normalized();
+      rays_.push_back(ray);
+      samples_.push_back({.pixel = pixel, .id = id});
+    }
   }
 
   [[nodiscard]] bool SeeTheSame(std::size_t a, std::size_t b) const {
@@ -547,7 +561,8 @@ DepthImage ImageRenderer::RenderDepth(const Pose3& X_WC) const {
   std::vector<float> cosines;
   for (int v = 0; v < height_; ++v) {
     for (int u = 0; u < width_; ++u) {
-      const Eigen::Vector2f through = RayThrough(u, v, Eigen::Vector2f::Constant(0.5F));
+      const Eigen::Vector2f through = 0.25F * (CornerRay(u, v) + CornerRay(u + 1, v) +
+                                               CornerRay(u, v + 1) + CornerRay(u + 1, v + 1));
       const Eigen::Vector3f p_C(through.x(), through.y(), 1.0F);
       Ray ray;
       ray.origin = X_WC.translation().cast<float>();

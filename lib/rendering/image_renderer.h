@@ -56,14 +56,13 @@ class ImageRenderer {
     return corner_rays_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_ + 1) +
                         static_cast<std::size_t>(column)];
   }
-  /// The ray (x, y, 1) in C through a point of a pixel; `offset` in [0, 1) x [0, 1).
-  [[nodiscard]] Eigen::Vector2f RayThrough(int u, int v, const Eigen::Vector2f& offset) const;
 
   int width_;
   int height_;
   int grid_side_;       ///< Samples of a pixel are spread over a grid of so many columns and rows.
-  float pixel_spread_;  ///< What a pixel becomes wider by along its ray, in m per m,
-  float spread_;        ///< and one of its samples.
+  float pixel_spread_;  ///< What a pixel becomes wider by along its ray, in m per m.
+  float cell_size_;     ///< Of the grid, as part of a pixel.
+  float spread_;        ///< What a sample becomes wider by.
   Eigen::Vector3f sun_tangent_ = Eigen::Vector3f::Zero();  ///< Across the direction to the sun.
   Eigen::Vector3f sun_bitangent_ = Eigen::Vector3f::Zero();
   const RayTracer& tracer_;

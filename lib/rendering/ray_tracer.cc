@@ -32,11 +32,23 @@ struct TracedMesh {
   UniqueScene scene_of_mesh;    ///< For instances; made when needed.
 };
 
-/// A mesh where it stands.
+/// What takes normals to W, but for their length: the inverse transpose, times the determinant.
+Eigen::Matrix3f NormalMatrix(const Eigen::Affine3f& X_WM) {
+  const Eigen::Matrix3f linear = X_WM.linear();
+  Eigen::Matrix3f cofactors;
+  cofactors << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)),
+      linear.col(0).cross(linear.col(1));
+  return cofactors;
+}
+
+/// A mesh where it stands, or between where it is at times 0 and 1.
 struct Placement {
-  const TracedMesh* traced = nullptr;
-  Eigen::Affine3f X_WM_begin;
-  Eigen::Affine3f X_WM_end;
+  Placement(const TracedMesh& mesh, const Eigen::Affine3f& begin, const Eigen::Affine3f& end)
+      : traced(&mesh), normals_begin(NormalMatrix(begin)), normals_end(NormalMatrix(end)) {}
+
+  const TracedMesh* traced;
+  Eigen::Matrix3f normals_begin;
+  Eigen::Matrix3f normals_end;
 };
 
 /// Embree hands this to the filter along with the rays.
@@ -235,8 +247,7 @@ struct RayTracer::Implementation {
           AttachInstance(
               device.get(), still_scene.get(), SceneOf(traced), std::span(&instance.X_WM, 1));
         }
-        still.push_back(
-            {.traced = &traced, .X_WM_begin = instance.X_WM, .X_WM_end = instance.X_WM});
+        still.emplace_back(traced, instance.X_WM, instance.X_WM);
       }
     }
     rtcCommitScene(still_scene.get());
@@ -342,8 +353,7 @@ void RayTracer::SetMoving(std::span<const MovingMesh> moving) {
     TracedMesh& traced = self.meshes[mover.mesh];
     const std::array<Eigen::Affine3f, 2> X_WMs{mover.X_WM_begin, mover.X_WM_end};
     AttachInstance(self.device.get(), self.moving_scene.get(), self.SceneOf(traced), X_WMs);
-    self.moving.push_back(
-        {.traced = &traced, .X_WM_begin = mover.X_WM_begin, .X_WM_end = mover.X_WM_end});
+    self.moving.emplace_back(traced, mover.X_WM_begin, mover.X_WM_end);
   }
   rtcCommitScene(self.moving_scene.get());
 }
@@ -371,14 +381,10 @@ Surface RayTracer::SurfaceAt(const Ray& ray, const Hit& hit, float spread) const
   const TracedMesh& traced = *placement.traced;
   const Mesh& mesh = *traced.mesh;
   const auto& triangle = mesh.triangles[hit.triangle];
-  const Eigen::Matrix3f linear =
-      (1.0F - ray.time) * placement.X_WM_begin.linear() + ray.time * placement.X_WM_end.linear();
-  // Scaled by its determinant, the inverse transpose is the matrix of cofactors.
-  Eigen::Matrix3f cofactors;
-  cofactors << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)),
-      linear.col(0).cross(linear.col(1));
+  const Eigen::Matrix3f normals =
+      placement.normals_begin + ray.time * (placement.normals_end - placement.normals_begin);
   const auto to_world = [&](const Eigen::Vector3f& normal_M) -> Eigen::Vector3f {
-    const Eigen::Vector3f normal_W = (cofactors * normal_M).normalized();
+    const Eigen::Vector3f normal_W = (normals * normal_M).normalized();
     return normal_W.dot(ray.direction) > 0.0F ? Eigen::Vector3f(-normal_W) : normal_W;
   };
   const Eigen::Vector3f edges_normal =
