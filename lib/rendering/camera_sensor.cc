@@ -26,20 +26,19 @@ class SrgbTable {
   SrgbTable() {
     for (std::size_t i = 0; i < table_.size(); ++i) {
       // By the square, so that dark values, where sRGB is steep, are finely divided.
-      const float root = static_cast<float>(i) / static_cast<float>(kSize);
-      table_.at(i) = SrgbFromLinear(root * root);
+      const float root = (static_cast<float>(i) + 0.5F) / static_cast<float>(kSize);
+      table_.at(i) = static_cast<std::uint8_t>(std::lround(SrgbFromLinear(root * root)));
     }
   }
 
   [[nodiscard]] std::uint8_t At(float linear) const {
     const float root = std::sqrt(std::clamp(linear, 0.0F, 1.0F));
-    const float value = table_[static_cast<std::size_t>(root * static_cast<float>(kSize) + 0.5F)];
-    return static_cast<std::uint8_t>(value + 0.5F);
+    return table_[static_cast<std::size_t>(root * static_cast<float>(kSize))];
   }
 
  private:
   static constexpr std::size_t kSize = 4096;
-  std::array<float, kSize + 1> table_{};
+  std::array<std::uint8_t, kSize + 1> table_{};
 };
 
 /// Draws of a standard normal distribution, from a table of its quantiles.

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
-#include <numeric>
 #include <span>
 #include <thread>
 
@@ -33,13 +32,17 @@ constexpr float kSunSide = 0.0083F;
 /// coarse.
 constexpr float kLiftM = 2e-3F;
 
+/// Some direction across another one.
+Eigen::Vector3f DirectionAcross(const Eigen::Vector3f& axis) {
+  constexpr float kNearlyUp = 0.9F;
+  if (std::abs(axis.z()) < kNearlyUp) return axis.cross(Eigen::Vector3f::UnitZ()).normalized();
+  return axis.cross(Eigen::Vector3f::UnitX()).normalized();
+}
+
 /// Two unit vectors that with `axis` make a right-handed frame.
 struct Tangents {
   explicit Tangents(const Eigen::Vector3f& axis)
-      : first((std::abs(axis.z()) < 0.9F ? Eigen::Vector3f(axis.cross(Eigen::Vector3f::UnitZ()))
-                                         : Eigen::Vector3f(axis.cross(Eigen::Vector3f::UnitX())))
-                  .normalized()),
-        second(axis.cross(first)) {}
+      : first(DirectionAcross(axis)), second(axis.cross(first)) {}
   Eigen::Vector3f first;
   Eigen::Vector3f second;
 };
@@ -123,8 +126,8 @@ class ImageRenderer::TileRenderer {
         random_(seed),
         begin_(sweep.X_WC_begin.translation().cast<float>()),
         end_(sweep.X_WC_end.translation().cast<float>()),
-        R_WC_begin_(sweep.X_WC_begin.R().cast<float>()),
-        R_WC_end_(sweep.X_WC_end.R().cast<float>()),
+        rotation_begin_(sweep.X_WC_begin.R().cast<float>()),
+        rotation_end_(sweep.X_WC_end.R().cast<float>()),
         exposure_part_(static_cast<float>(sweep.exposure_part)) {}
 
   void Render(int tile_u, int tile_v, LinearImage& image) {
@@ -190,10 +193,10 @@ class ImageRenderer::TileRenderer {
       const ImageRenderer& renderer = tile.renderer_;
       const Eigen::Vector2f& corner = renderer.CornerRay(u, v);
       const Eigen::Vector3f p_C(corner.x(), corner.y(), 1.0F);
-      begin = tile.R_WC_begin_ * p_C;
-      turn = tile.R_WC_end_ * p_C - begin;
-      along_u = tile.R_WC_begin_.leftCols<2>() * (renderer.CornerRay(u + 1, v) - corner);
-      along_v = tile.R_WC_begin_.leftCols<2>() * (renderer.CornerRay(u, v + 1) - corner);
+      begin = tile.rotation_begin_ * p_C;
+      turn = tile.rotation_end_ * p_C - begin;
+      along_u = tile.rotation_begin_.leftCols<2>() * (renderer.CornerRay(u + 1, v) - corner);
+      along_v = tile.rotation_begin_.leftCols<2>() * (renderer.CornerRay(u, v + 1) - corner);
     }
 
     int u;
@@ -221,7 +224,8 @@ class ImageRenderer::TileRenderer {
       const Eigen::Array4f random = Random(id, kPlace);
       Eigen::Array2f offset = random.head<2>();
       if (s < side * side) {
-        const Eigen::Array2f cell(static_cast<float>(s % side), static_cast<float>(s / side));
+        const int row = s / side;
+        const Eigen::Array2f cell(static_cast<float>(s - row * side), static_cast<float>(row));
         offset = (offset + cell) * renderer_.cell_size_;
       }
       const float in_exposure = (static_cast<float>(s) + random[2]) / static_cast<float>(samples);
@@ -249,18 +253,24 @@ class ImageRenderer::TileRenderer {
       while (end < samples_.size() && samples_[end].pixel == samples_[begin].pixel)
         ++end;
       while (begin < end) {
-        std::size_t next = begin + 1;
-        for (std::size_t i = next; i < end; ++i) {
-          if (!SeeTheSame(begin, i)) continue;
-          std::swap(rays_[i], rays_[next]);
-          std::swap(hits_[i], hits_[next]);
-          std::swap(samples_[i], samples_[next]);
-          ++next;
-        }
+        const std::size_t next = GatherWhatSeesTheSame(begin, end);
         AddGroup(begin, next - begin);
         begin = next;
       }
     }
+  }
+
+  /// Brings the samples that see what the first one sees to the front. @return where they end.
+  std::size_t GatherWhatSeesTheSame(std::size_t begin, std::size_t end) {
+    std::size_t next = begin + 1;
+    for (std::size_t i = next; i < end; ++i) {
+      if (!SeeTheSame(begin, i)) continue;
+      std::swap(rays_[i], rays_[next]);
+      std::swap(hits_[i], hits_[next]);
+      std::swap(samples_[i], samples_[next]);
+      ++next;
+    }
+    return next;
   }
 
   void AddGroup(std::size_t begin, std::size_t count) {
@@ -295,25 +305,27 @@ class ImageRenderer::TileRenderer {
     TraceSun();
     ClearSecondary();
     for (const Group& group : groups_) {
-      const std::size_t last = group.begin + group.count - 1;
-      if (!(group.sun > 0.0F) || group.count <= 2) continue;
-      const bool agree = sun_visible_[group.begin] == sun_visible_[last];
-      for (std::size_t i = group.begin + 1; i < last; ++i) {
-        if (agree) {
-          sun_visible_[i] = sun_visible_[last];
-        } else {
-          CastSunRay(group, i);
-        }
-      }
+      if (group.sun > 0.0F && group.count > 2) CastSunRaysBetween(group);
     }
     TraceSun();
-    for (Group& group : groups_) {
-      const auto visible = std::accumulate(
-          sun_visible_.begin() + static_cast<std::ptrdiff_t>(group.begin),
-          sun_visible_.begin() + static_cast<std::ptrdiff_t>(group.begin + group.count),
-          0);
-      group.sun *= static_cast<float>(visible) / static_cast<float>(group.count);
+    for (Group& group : groups_)
+      group.sun *= VisiblePartOfSun(group);
+  }
+
+  void CastSunRaysBetween(const Group& group) {
+    const std::size_t last = group.begin + group.count - 1;
+    const bool agree = sun_visible_[group.begin] == sun_visible_[last];
+    for (std::size_t i = group.begin + 1; i < last; ++i) {
+      sun_visible_[i] = sun_visible_[last];
+      if (!agree) CastSunRay(group, i);
     }
+  }
+
+  [[nodiscard]] float VisiblePartOfSun(const Group& group) const {
+    int visible = 0;
+    for (std::size_t i = group.begin; i < group.begin + group.count; ++i)
+      visible += sun_visible_[i];
+    return static_cast<float>(visible) / static_cast<float>(group.count);
   }
 
   /// The part of the sun's light that would fall on the surface without shadows.
@@ -397,27 +409,35 @@ class ImageRenderer::TileRenderer {
     shared_open_.resize(groups_.size());
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const Group& group = groups_[g];
-      shared_open_[g] = group.open;
-      if (!hits_[group.begin].is_hit() || group.surface.material->translucency > 0.0F) continue;
-      const auto [u, v] = PixelOf(group);
-      // The window stays within the tile, and so has each direction once.
-      const int u_begin = std::clamp(u - 2, tile_u_, std::max(tile_u_, tile_u_end_ - 4));
-      const int v_begin = std::clamp(v - 2, tile_v_, std::max(tile_v_, tile_v_end_ - 4));
-      float sum = group.looked_up ? group.open : 0.0F;
-      float count = group.looked_up ? 1.0F : 0.0F;
-      for (int row = v_begin; row < std::min(v_begin + 4, tile_v_end_); ++row) {
-        for (int column = u_begin; column < std::min(u_begin + 4, tile_u_end_); ++column) {
-          const std::uint32_t other = first_group_[TileIndex(column, row)];
-          if (other == kNoGroup || other == g || !groups_[other].looked_up) continue;
-          if (!AreOneSurface(group, groups_[other])) continue;
-          sum += groups_[other].open;
-          count += 1.0F;
-        }
-      }
-      if (count > 0.0F) shared_open_[g] = sum / count;
+      const bool shares =
+          hits_[group.begin].is_hit() && group.surface.material->translucency <= 0.0F;
+      shared_open_[g] = shares ? MeanOpenSky(g) : group.open;
     }
     for (std::size_t g = 0; g < groups_.size(); ++g)
       groups_[g].open = shared_open_[g];
+  }
+
+  [[nodiscard]] float MeanOpenSky(std::size_t g) const {
+    const Group& group = groups_[g];
+    const auto [u, v] = PixelOf(group);
+    // The window stays within the tile, and so has each direction once.
+    const int u_begin = std::clamp(u - 2, tile_u_, std::max(tile_u_, tile_u_end_ - 4));
+    const int v_begin = std::clamp(v - 2, tile_v_, std::max(tile_v_, tile_v_end_ - 4));
+    float sum = group.looked_up ? group.open : 0.0F;
+    float count = group.looked_up ? 1.0F : 0.0F;
+    for (int row = v_begin; row < std::min(v_begin + 4, tile_v_end_); ++row) {
+      for (int column = u_begin; column < std::min(u_begin + 4, tile_u_end_); ++column) {
+        const std::uint32_t other = first_group_[TileIndex(column, row)];
+        if (other == kNoGroup || other == g || !MayShare(group, groups_[other])) continue;
+        sum += groups_[other].open;
+        count += 1.0F;
+      }
+    }
+    return count > 0.0F ? sum / count : group.open;
+  }
+
+  [[nodiscard]] bool MayShare(const Group& group, const Group& other) const {
+    return other.looked_up && AreOneSurface(group, other);
   }
 
   [[nodiscard]] bool AreOneSurface(const Group& a, const Group& b) const {
@@ -437,7 +457,8 @@ class ImageRenderer::TileRenderer {
   }
 
   [[nodiscard]] std::size_t TileIndex(int u, int v) const {
-    return static_cast<std::size_t>((v - tile_v_) * kTile + u - tile_u_);
+    return static_cast<std::size_t>(v - tile_v_) * std::size_t{kTile} +
+           static_cast<std::size_t>(u - tile_u_);
   }
 
   void ClearSecondary() {
@@ -510,8 +531,8 @@ class ImageRenderer::TileRenderer {
   CounterRandom random_;
   Eigen::Vector3f begin_;
   Eigen::Vector3f end_;
-  Eigen::Matrix3f R_WC_begin_;
-  Eigen::Matrix3f R_WC_end_;
+  Eigen::Matrix3f rotation_begin_;
+  Eigen::Matrix3f rotation_end_;
   float exposure_part_;
 
   // By sample of the tile, those of a pixel next to each other; kept between tiles so that nothing
@@ -529,7 +550,8 @@ class ImageRenderer::TileRenderer {
   int tile_v_ = 0;
   int tile_u_end_ = 0;
   int tile_v_end_ = 0;
-  std::array<std::uint32_t, kTile * kTile> first_group_{};  ///< Of each pixel of the tile.
+  std::array<std::uint32_t, std::size_t{kTile} * kTile>
+      first_group_{};  ///< Of each pixel of the tile.
 
   // By ray from a surface, and the sample or group whose surface that is.
   std::vector<Ray> secondary_;
@@ -549,6 +571,7 @@ LinearImage ImageRenderer::Render(const CameraSweep& sweep, std::uint64_t seed) 
       renderer.Render(tile % columns * kTile, tile / columns * kTile, image);
   };
   std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(options_.threads));
   for (int i = 0; i < options_.threads; ++i)
     threads.emplace_back(work);
   threads.clear();
@@ -557,8 +580,12 @@ LinearImage ImageRenderer::Render(const CameraSweep& sweep, std::uint64_t seed) 
 
 DepthImage ImageRenderer::RenderDepth(const Pose3& X_WC) const {
   DepthImage image{.width = width_, .height = height_, .depths_m = {}};
+  const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   std::vector<Ray> rays;
   std::vector<float> cosines;
+  rays.reserve(pixels);
+  cosines.reserve(pixels);
+  image.depths_m.reserve(pixels);
   for (int v = 0; v < height_; ++v) {
     for (int u = 0; u < width_; ++u) {
       const Eigen::Vector2f through = 0.25F * (CornerRay(u, v) + CornerRay(u + 1, v) +

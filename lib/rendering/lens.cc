@@ -28,9 +28,17 @@ float SoftDisk(float distance, float radius) {
   return part <= 0.0F ? 0.0F : part * part * (3.0F - 2.0F * part);
 }
 
-/// Calls `visit(u, v, distance)` for the pixels of the image within a radius.
+/// A round spot of the image, in pixels.
+struct Disk {
+  float x;
+  float y;
+  float radius;
+};
+
+/// Calls `visit(u, v, distance)` for the pixels of the image within a disk.
 template <typename Visit>
-void ForDisk(int width, int height, float x, float y, float radius, const Visit& visit) {
+void ForDisk(int width, int height, const Disk& disk, const Visit& visit) {
+  const auto [x, y, radius] = disk;
   const int u_begin = std::max(0, static_cast<int>(x - radius));
   const int u_end = std::min(width, static_cast<int>(x + radius) + 2);
   const int v_begin = std::max(0, static_cast<int>(y - radius));
@@ -56,7 +64,7 @@ Lens::Lens(int width, int height, double dirt, double rain, std::uint64_t seed)
     const float size = random.Unit(4 * i + 2);
     const float radius = static_cast<float>(width) * (0.006F + 0.045F * size * size * size);
     const float strength = static_cast<float>(dirt) * (0.25F + 0.6F * random.Unit(4 * i + 3));
-    ForDisk(width, height, x, y, radius, [&](int u, int v, float distance) {
+    ForDisk(width, height, {x, y, radius}, [&](int u, int v, float distance) {
       float& opacity = opacity_[static_cast<std::size_t>(v) * static_cast<std::size_t>(width_) +
                                 static_cast<std::size_t>(u)];
       opacity = 1.0F - (1.0F - opacity) * (1.0F - strength * SoftDisk(distance, radius));
@@ -91,7 +99,7 @@ void Lens::ApplyDrops(LinearImage& image, double time_s) const {
     const float x = random.Unit(4 * i) * static_cast<float>(width_);
     const float y = random.Unit(4 * i + 1) * static_cast<float>(height_);
     const float radius = static_cast<float>(width_) * (0.006F + 0.016F * random.Unit(4 * i + 2));
-    ForDisk(width_, height_, x, y, radius, [&](int u, int v, float distance) {
+    ForDisk(width_, height_, {x, y, radius}, [&](int u, int v, float distance) {
       // A drop is a small lens that shows the scene upside down and blurred.
       const float dx = static_cast<float>(u) - x;
       const float dy = static_cast<float>(v) - y;

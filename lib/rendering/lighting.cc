@@ -143,6 +143,11 @@ Eigen::Array3f Lighting::AmbientIrradiance(const Eigen::Vector3f& normal) const 
   return up * ambient_up_ + (1.0F - up) * ambient_down_;
 }
 
+std::size_t Lighting::GridIndex(int column, int row) const {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(grid_columns_) +
+         static_cast<std::size_t>(column);
+}
+
 void Lighting::SortLamps(std::span<const Lamp> lamps) {
   if (!lamps_on_ || lamps.empty()) return;
   Eigen::Array2f low = lamps.front().p_WL.head<2>().array();
@@ -162,7 +167,7 @@ void Lighting::SortLamps(std::span<const Lamp> lamps) {
     const Eigen::Array2i to = ((at + kLampReachM) / kGridCellM).floor().cast<int>();
     for (int row = from.y(); row <= std::min(to.y(), grid_rows_ - 1); ++row) {
       for (int column = from.x(); column <= std::min(to.x(), grid_columns_ - 1); ++column)
-        lamp_grid_[static_cast<std::size_t>(row * grid_columns_ + column)].push_back(lamp);
+        lamp_grid_[GridIndex(column, row)].push_back(lamp);
     }
   }
 }
@@ -176,9 +181,7 @@ Eigen::Array3f Lighting::LampIrradiance(const Eigen::Vector3f& position,
       !(cell.y() < static_cast<float>(grid_rows_))) {
     return sum;
   }
-  const std::size_t index =
-      static_cast<std::size_t>(cell.y()) * static_cast<std::size_t>(grid_columns_) +
-      static_cast<std::size_t>(cell.x());
+  const std::size_t index = GridIndex(static_cast<int>(cell.x()), static_cast<int>(cell.y()));
   for (const Lamp& lamp : lamp_grid_[index]) {
     const Eigen::Vector3f to_lamp = lamp.p_WL - position;
     const float distance = to_lamp.norm();

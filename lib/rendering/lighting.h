@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -49,6 +50,7 @@ class Lighting {
  private:
   [[nodiscard]] float CloudAt(const Eigen::Vector3f& direction) const;
   void SortLamps(std::span<const Lamp> lamps);
+  [[nodiscard]] std::size_t GridIndex(int column, int row) const;
 
   Eigen::Vector3f to_sun_;
   Eigen::Array3f sun_irradiance_;

@@ -8,12 +8,14 @@
 
 namespace relocd {
 
-void MeshBuilder::AddQuad(const Eigen::Vector3f& corner,
-                          const Eigen::Vector3f& edge_u,
-                          const Eigen::Vector3f& edge_v,
-                          std::uint32_t material,
-                          float tile_m,
-                          const Eigen::Vector2f& uv_origin) {
+// A shape is these numbers.
+void MeshBuilder::AddQuad(  // NOLINT(readability-function-size)
+    const Eigen::Vector3f& corner,
+    const Eigen::Vector3f& edge_u,
+    const Eigen::Vector3f& edge_v,
+    std::uint32_t material,
+    float tile_m,
+    const Eigen::Vector2f& uv_origin) {
   const Eigen::Vector2f size(edge_u.norm() / tile_m, edge_v.norm() / tile_m);
   AddQuadWithUvs(corner, edge_u, edge_v, uv_origin, uv_origin + size, material);
 }
@@ -26,12 +28,14 @@ void MeshBuilder::AddPicture(const Eigen::Vector3f& corner,
   AddQuadWithUvs(corner, edge_u, edge_v, part.low, part.high, material);
 }
 
-void MeshBuilder::AddQuadWithUvs(const Eigen::Vector3f& corner,
-                                 const Eigen::Vector3f& edge_u,
-                                 const Eigen::Vector3f& edge_v,
-                                 const Eigen::Vector2f& uv_low,
-                                 const Eigen::Vector2f& uv_high,
-                                 std::uint32_t material) {
+// A shape is these numbers.
+void MeshBuilder::AddQuadWithUvs(  // NOLINT(readability-function-size)
+    const Eigen::Vector3f& corner,
+    const Eigen::Vector3f& edge_u,
+    const Eigen::Vector3f& edge_v,
+    const Eigen::Vector2f& uv_low,
+    const Eigen::Vector2f& uv_high,
+    std::uint32_t material) {
   const Eigen::Vector3f normal = edge_u.cross(edge_v).normalized();
   // v goes down the image.
   const std::uint32_t a = AddVertex(corner, normal, {uv_low.x(), 1.0F - uv_low.y()});
@@ -49,10 +53,10 @@ void MeshBuilder::AddBox(const Eigen::Vector3f& low,
                          float tile_m,
                          const Eigen::Affine3f& X_MB) {
   const Eigen::Vector3f size = high - low;
-  const Eigen::Matrix3f R = X_MB.linear();
-  const Eigen::Vector3f x = R.col(0) * size.x();
-  const Eigen::Vector3f y = R.col(1) * size.y();
-  const Eigen::Vector3f z = R.col(2) * size.z();
+  const Eigen::Matrix3f axes = X_MB.linear();
+  const Eigen::Vector3f x = axes.col(0) * size.x();
+  const Eigen::Vector3f y = axes.col(1) * size.y();
+  const Eigen::Vector3f z = axes.col(2) * size.z();
   const Eigen::Vector3f o = X_MB * low;
   AddQuad(o, x, z, material, tile_m);
   AddQuad(o + x, y, z, material, tile_m);
@@ -73,13 +77,15 @@ void MeshBuilder::AddTriangle(const std::array<Eigen::Vector3f, 3>& corners,
   AddFace(a, b, c, material);
 }
 
-void MeshBuilder::AddCylinder(const Eigen::Vector3f& base,
-                              float radius_m,
-                              float top_radius_m,
-                              float height_m,
-                              int sides,
-                              std::uint32_t material,
-                              float tile_m) {
+// A shape is these numbers.
+void MeshBuilder::AddCylinder(  // NOLINT(readability-function-size)
+    const Eigen::Vector3f& base,
+    float radius_m,
+    float top_radius_m,
+    float height_m,
+    int sides,
+    std::uint32_t material,
+    float tile_m) {
   const auto first = static_cast<std::uint32_t>(mesh_.positions.size());
   for (int i = 0; i <= sides; ++i) {
     const float angle =
@@ -107,7 +113,8 @@ void MeshBuilder::AddGrid(std::span<const Eigen::Vector3f> points,
   const auto at = [&](int row, int column) {
     row = std::clamp(row, 0, rows - 1);
     column = std::clamp(column, 0, columns - 1);
-    return points[static_cast<std::size_t>(row * columns + column)];
+    return points[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                  static_cast<std::size_t>(column)];
   };
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {

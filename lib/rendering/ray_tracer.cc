@@ -53,7 +53,7 @@ struct Placement {
 
 /// Embree hands this to the filter along with the rays.
 struct TracingContext {
-  RTCIntersectContext embree;
+  RTCIntersectContext embree{};
   float spread = 0.0F;
 };
 
@@ -232,23 +232,21 @@ struct RayTracer::Implementation {
 
   /// Meshes that are there once become part of the whole, which is faster to trace than instances.
   void AddStill(std::span<const MeshInstance> instances, std::span<const MeshInstance> more) {
+    std::vector<MeshInstance> all(instances.begin(), instances.end());
+    all.insert(all.end(), more.begin(), more.end());
     std::vector<int> uses(meshes.size(), 0);
-    for (const auto& list : {instances, more}) {
-      for (const MeshInstance& instance : list)
-        ++uses[instance.mesh];
-    }
+    for (const MeshInstance& instance : all)
+      ++uses[instance.mesh];
     still_scene.reset(rtcNewScene(device.get()));
-    for (const auto& list : {instances, more}) {
-      for (const MeshInstance& instance : list) {
-        TracedMesh& traced = meshes[instance.mesh];
-        if (uses[instance.mesh] == 1) {
-          AttachTriangles(device.get(), still_scene.get(), traced, instance.X_WM);
-        } else {
-          AttachInstance(
-              device.get(), still_scene.get(), SceneOf(traced), std::span(&instance.X_WM, 1));
-        }
-        still.emplace_back(traced, instance.X_WM, instance.X_WM);
+    for (const MeshInstance& instance : all) {
+      TracedMesh& traced = meshes[instance.mesh];
+      if (uses[instance.mesh] == 1) {
+        AttachTriangles(device.get(), still_scene.get(), traced, instance.X_WM);
+      } else {
+        AttachInstance(
+            device.get(), still_scene.get(), SceneOf(traced), std::span(&instance.X_WM, 1));
       }
+      still.emplace_back(traced, instance.X_WM, instance.X_WM);
     }
     rtcCommitScene(still_scene.get());
   }
