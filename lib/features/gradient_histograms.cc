@@ -179,28 +179,32 @@ Eigen::Vector2f GradientHistograms::CellCentre(const Cell& cell) const {
           static_cast<float>(cell.row * config_.cell_stride + half)};
 }
 
+void GradientHistograms::AppendTile(int first_column, int first_row) {
+  const int columns = config_.working_width / config_.cell_stride;
+  const int rows = config_.working_height / config_.cell_stride;
+  for (int row = first_row; row < std::min(first_row + kTileCells, rows); ++row) {
+    for (int column = first_column; column < std::min(first_column + kTileCells, columns);
+         ++column) {
+      const Eigen::Vector2f centre = CellCentre({0.0F, column, row});
+      cells_.push_back({maps_.Texture(0, centre.x(), centre.y()), column, row});
+    }
+  }
+}
+
 void GradientHistograms::ChooseCells(std::size_t max_cells) {
   const int columns = config_.working_width / config_.cell_stride;
   const int rows = config_.working_height / config_.cell_stride;
   const int tile_columns = (columns + kTileCells - 1) / kTileCells;
   const int tile_rows = (rows + kTileCells - 1) / kTileCells;
+  const auto tile_limit = static_cast<std::ptrdiff_t>(
+      std::ceil(kTileShare * static_cast<double>(max_cells) / (tile_columns * tile_rows)));
   const auto more_texture = [](const Cell& a, const Cell& b) {
     return std::tuple(b.texture, a.row, a.column) < std::tuple(a.texture, b.row, b.column);
   };
-  const auto tile_limit = static_cast<std::ptrdiff_t>(
-      std::ceil(kTileShare * static_cast<double>(max_cells) / (tile_columns * tile_rows)));
   cells_.clear();
   for (int tile = 0; tile < tile_columns * tile_rows; ++tile) {
-    const int first_column = tile % tile_columns * kTileCells;
-    const int first_row = tile / tile_columns * kTileCells;
     const auto tile_begin = static_cast<std::ptrdiff_t>(cells_.size());
-    for (int row = first_row; row < std::min(first_row + kTileCells, rows); ++row) {
-      for (int column = first_column; column < std::min(first_column + kTileCells, columns);
-           ++column) {
-        const Eigen::Vector2f centre = CellCentre({0.0F, column, row});
-        cells_.push_back({maps_.Texture(0, centre.x(), centre.y()), column, row});
-      }
-    }
+    AppendTile(tile % tile_columns * kTileCells, tile / tile_columns * kTileCells);
     if (std::ssize(cells_) - tile_begin > tile_limit) {
       std::nth_element(cells_.begin() + tile_begin,
                        cells_.begin() + tile_begin + tile_limit,

@@ -68,6 +68,7 @@ class GradientHistograms final : public FeatureExtractor {
   void Describe(const Eigen::Vector2f& centre, std::span<float> feature) const;
 
   void ChooseCells(std::size_t max_cells);
+  void AppendTile(int first_column, int first_row);
   [[nodiscard]] Eigen::Vector2f CellCentre(const Cell& cell) const;
 
   GradientHistogramsConfig config_;
