@@ -68,39 +68,47 @@ Result<void> CheckAlike(const SelectedFrames& first, const SelectedFrames& other
   return {};
 }
 
+/// The drives' first one, and how far along it each of its frames was taken.
+struct Route {
+  const SelectedFrames& drive;
+  std::vector<double> travelled_m;
+};
+
+Result<RouteFrame> PlaceFrame(const Route& route, const DatasetFrame& frame) {
+  const std::vector<DatasetFrame>& frames = route.drive.dataset.frames;
+  const std::size_t at = NearestFrame(frames, frame.X_WC);
+  const double aside_m = (frames[at].X_WC.translation() - frame.X_WC.translation()).norm();
+  if (aside_m > kMaxAsideM) {
+    return Invalid(fmt::format("frame {} is {:.1f} m from the route of {}, must be within {} m",
+                               frame.index,
+                               aside_m,
+                               route.drive.dataset.directory,
+                               kMaxAsideM));
+  }
+  return RouteFrame{.frame = frame, .along_m = route.travelled_m[at]};
+}
+
 }  // namespace
 
 Result<std::vector<RouteFrame>> PlaceOnRoute(const std::vector<SelectedFrames>& drives,
                                              int held_out_every) {
-  const std::vector<DatasetFrame>& route = drives.front().dataset.frames;
-  const std::vector<double> travelled = TravelledMetres(route);
+  const Route route{drives.front(), TravelledMetres(drives.front().dataset.frames)};
   const auto every = static_cast<std::size_t>(held_out_every);
-  std::vector<RouteFrame> placed;
+  std::vector<RouteFrame> all;
   for (std::size_t drive = 0; drive < drives.size(); ++drive) {
     const Dataset& dataset = drives[drive].dataset;
-    if (auto alike = CheckAlike(drives.front(), drives[drive]); !alike) {
+    if (auto alike = CheckAlike(route.drive, drives[drive]); !alike) {
       return std::move(alike).error();
     }
     for (std::size_t index = 0; index < dataset.frames.size(); ++index) {
-      const DatasetFrame& frame = dataset.frames[index];
-      const std::size_t at = drive == 0 ? index : NearestFrame(route, frame.X_WC);
-      const double aside_m = (route[at].X_WC.translation() - frame.X_WC.translation()).norm();
-      if (aside_m > kMaxAsideM) {
-        return Invalid(
-            fmt::format("{}: frame {} is {:.1f} m from the route of {}, must be within {} m",
-                        dataset.directory,
-                        frame.index,
-                        aside_m,
-                        drives.front().dataset.directory,
-                        kMaxAsideM));
-      }
-      placed.push_back({.frame = frame,
-                        .drive = drive,
-                        .along_m = travelled[at],
-                        .is_held_out = index % every == every / 2});
+      auto placed = PlaceFrame(route, dataset.frames[index]);
+      if (!placed) return std::move(placed).error().WithContext(dataset.directory);
+      placed->drive = drive;
+      placed->is_held_out = index % every == every / 2;
+      all.push_back(std::move(*placed));
     }
   }
-  return placed;
+  return all;
 }
 
 std::vector<RegionFrames> DivideRoute(const std::vector<RouteFrame>& frames,

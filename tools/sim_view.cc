@@ -158,7 +158,7 @@ Result<void> View(const Options& options) {
   if (!renderer) return std::move(renderer).error();
   const Pose3 X_WC =
       options.from_above ? ViewFromAbove(*world, extent) : DriverView(*world, options);
-  const RgbImage image = (*renderer)->Render(0, [&](std::int64_t) { return X_WC; });
+  const RgbImage image = (*renderer)->Render(0, [&X_WC](std::int64_t) { return Pose3(X_WC); });
   if (auto ok = WriteImage(options.out, image); !ok) return ok;
   if (options.from_above) {
     fmt::print("{:.3f},{:.3f},{:.3f},{:.3f}\n",

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/counter_random.h"
-
 namespace relocd {
 namespace {
 
@@ -15,7 +13,7 @@ constexpr double kWalkingSpeedMps = 1.4;
 /// The upright pose on the ground, tilted as the ground is between two points along x.
 Eigen::Affine3f StandOnGround(const Ground& ground, const Pose2& X_WM, double length_m) {
   const Eigen::Vector2d ahead(std::cos(X_WM.yaw()), std::sin(X_WM.yaw()));
-  const Eigen::Vector2d at = X_WM.translation();
+  const Eigen::Vector2d& at = X_WM.translation();
   const double front = ground.HeightAlong(at + 0.5 * length_m * ahead, X_WM.yaw());
   const double rear = ground.HeightAlong(at - 0.5 * length_m * ahead, X_WM.yaw());
   const double pitch = -std::atan2(front - rear, length_m);
@@ -50,51 +48,59 @@ std::vector<MeshInstance> ParkedCars(const World& world, const Session& session)
 
 MovingActors::MovingActors(const World& world, const Session& session, std::uint64_t seed)
     : world_(world) {
-  AddActors(world.traffic, world.car_meshes, session.cars_per_km, kCarSpeedMps, false, seed);
-  AddActors(world.walkways,
-            world.pedestrian_meshes,
-            session.pedestrians_per_km,
-            kWalkingSpeedMps,
-            true,
-            seed + 1);
+  const Kind cars{.meshes = world.car_meshes,
+                  .per_km = session.cars_per_km,
+                  .speed_mps = kCarSpeedMps,
+                  .walks = false};
+  const Kind people{.meshes = world.pedestrian_meshes,
+                    .per_km = session.pedestrians_per_km,
+                    .speed_mps = kWalkingSpeedMps,
+                    .walks = true};
+  AddActors(world.traffic, cars, seed);
+  AddActors(world.walkways, people, seed + 1);
 }
 
-void MovingActors::AddActors(const std::vector<Path>& paths,
-                             const std::vector<std::uint32_t>& meshes,
-                             double per_km,
-                             double speed_mps,
-                             bool both_ways,
-                             std::uint64_t seed) {
-  if (meshes.empty() || !(per_km > 0.0)) return;
+void MovingActors::AddActors(const std::vector<Path>& paths, const Kind& kind, std::uint64_t seed) {
+  if (kind.meshes.empty() || !(kind.per_km > 0.0)) return;
   const CounterRandom random(seed ^ 0xAC7025ULL);
   std::uint64_t counter = 0;
   for (const Path& path : paths) {
     if (path.points.size() < 2) continue;
-    MeasuredPath measured{.path = &path, .distances_m = {0.0}};
-    const std::size_t segments = path.points.size() - (path.is_closed ? 0 : 1);
-    for (std::size_t i = 0; i < segments; ++i) {
-      const Eigen::Vector2d step = path.points[(i + 1) % path.points.size()] - path.points[i];
-      measured.distances_m.push_back(measured.length_m() + step.norm());
+    paths_.push_back(Measure(path));
+    AddActorsOnLastPath(kind, random, counter);
+  }
+}
+
+MovingActors::MeasuredPath MovingActors::Measure(const Path& path) {
+  MeasuredPath measured{.path = &path, .distances_m = {0.0}};
+  const std::size_t segments = path.points.size() - (path.is_closed ? 0 : 1);
+  for (std::size_t i = 0; i < segments; ++i) {
+    const Eigen::Vector2d step = path.points[(i + 1) % path.points.size()] - path.points[i];
+    measured.distances_m.push_back(measured.length_m() + step.norm());
+  }
+  return measured;
+}
+
+void MovingActors::AddActorsOnLastPath(const Kind& kind,
+                                       const CounterRandom& random,
+                                       std::uint64_t& counter) {
+  const double length_m = paths_.back().length_m();
+  const double expected = kind.per_km * length_m * 1e-3;
+  const auto count = static_cast<int>(expected + random.Unit(counter++));
+  const auto meshes = static_cast<std::uint32_t>(kind.meshes.size());
+  for (int i = 0; i < count; ++i) {
+    Actor actor{.path = paths_.size() - 1};
+    actor.mesh = kind.meshes[CounterRandom::Below(
+        meshes, static_cast<std::uint32_t>(random.Bits(counter++)))];
+    // Evenly spread, so that they do not drive through each other.
+    actor.start_m = length_m * (i + 0.6 * random.Unit(counter++)) / count;
+    actor.speed_mps = kind.speed_mps;
+    if (kind.walks) {
+      actor.speed_mps *= 0.8 + 0.4 * random.Unit(counter++);
+      if (random.Unit(counter++) < 0.5F) actor.speed_mps *= -1.0;
+      actor.aside_m = 0.8 * (random.Unit(counter++) - 0.5);
     }
-    const double expected = per_km * measured.length_m() * 1e-3;
-    const auto count = static_cast<int>(expected + random.Unit(counter++));
-    const double length_m = measured.length_m();
-    paths_.push_back(std::move(measured));
-    for (int i = 0; i < count; ++i) {
-      Actor actor{.path = paths_.size() - 1};
-      const auto kinds = static_cast<std::uint32_t>(meshes.size());
-      actor.mesh =
-          meshes[CounterRandom::Below(kinds, static_cast<std::uint32_t>(random.Bits(counter++)))];
-      // Evenly spread, so that they do not drive through each other.
-      actor.start_m = length_m * (i + 0.6 * random.Unit(counter++)) / count;
-      actor.speed_mps = speed_mps;
-      if (both_ways) {
-        actor.speed_mps *= 0.8 + 0.4 * random.Unit(counter++);
-        if (random.Unit(counter++) < 0.5F) actor.speed_mps *= -1.0;
-        actor.aside_m = 0.8 * (random.Unit(counter++) - 0.5);
-      }
-      actors_.push_back(actor);
-    }
+    actors_.push_back(actor);
   }
 }
 

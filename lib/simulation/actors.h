@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/counter_random.h"
 #include "rendering/ray_tracer.h"
 #include "rendering/scene.h"
 #include "simulation/session.h"
@@ -39,12 +40,17 @@ class MovingActors {
     [[nodiscard]] double length_m() const { return distances_m.back(); }
   };
 
-  void AddActors(const std::vector<Path>& paths,
-                 const std::vector<std::uint32_t>& meshes,
-                 double per_km,
-                 double speed_mps,
-                 bool both_ways,
-                 std::uint64_t seed);
+  /// Those of one kind: cars, or people.
+  struct Kind {
+    const std::vector<std::uint32_t>& meshes;
+    double per_km;
+    double speed_mps;
+    bool walks;  ///< Both ways, each at a pace and a place of its own.
+  };
+
+  void AddActors(const std::vector<Path>& paths, const Kind& kind, std::uint64_t seed);
+  void AddActorsOnLastPath(const Kind& kind, const CounterRandom& random, std::uint64_t& counter);
+  static MeasuredPath Measure(const Path& path);
   [[nodiscard]] Eigen::Affine3f PlaceOf(const Actor& actor, double time_s) const;
 
   const World& world_;

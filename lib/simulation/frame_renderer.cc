@@ -104,7 +104,7 @@ Result<std::unique_ptr<FrameRenderer>> FrameRenderer::Create(const World& world,
   return frames;
 }
 
-RgbImage FrameRenderer::Render(std::int64_t time_ns, const CameraMotion& X_WC_at) {
+RgbImage FrameRenderer::Render(std::int64_t time_ns, const CameraMotion& camera_motion) {
   Implementation& self = *implementation_;
   // The exposure that the camera is at; the one that this image asks for comes with the next.
   const double exposure_s = self.exposure.last_time_s();
@@ -112,8 +112,8 @@ RgbImage FrameRenderer::Render(std::int64_t time_ns, const CameraMotion& X_WC_at
   const auto half_ns = static_cast<std::int64_t>(std::llround(0.5e9 * sweep_s));
   const double time_s = static_cast<double>(time_ns) * 1e-9;
   self.tracer->SetMoving(self.actors.During(time_s - 0.5 * sweep_s, time_s + 0.5 * sweep_s));
-  const CameraSweep sweep{.X_WC_begin = X_WC_at(time_ns - half_ns),
-                          .X_WC_end = X_WC_at(time_ns + half_ns),
+  const CameraSweep sweep{.X_WC_begin = camera_motion(time_ns - half_ns),
+                          .X_WC_end = camera_motion(time_ns + half_ns),
                           .exposure_part = exposure_s / sweep_s};
   const std::uint64_t seed = self.options.seed * 0x10001 + 2 * self.frame_count++;
   LinearImage radiance = self.renderer->Render(sweep, seed);

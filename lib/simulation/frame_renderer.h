@@ -45,7 +45,7 @@ class FrameRenderer {
 
   /// @param time_ns  the middle of the exposure of the middle row, since the drive's begin. Frames
   ///                 come in the order of their times: the exposure follows what was seen before.
-  RgbImage Render(std::int64_t time_ns, const CameraMotion& X_WC_at);
+  RgbImage Render(std::int64_t time_ns, const CameraMotion& camera_motion);
 
  private:
   FrameRenderer();
