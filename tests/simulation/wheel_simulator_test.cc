@@ -8,27 +8,12 @@
 #include <gtest/gtest.h>
 
 #include "geometry/covariance.h"
+#include "simulation/winding_drive.h"
 #include "support/eigen_matchers.h"
 #include "support/wheel_ticks_frame.h"
 
 namespace relocd {
 namespace {
-
-constexpr std::int64_t kStepNs = 50'000'000;
-
-/// Half a minute of bends and changes of speed, sometimes backwards, without any sideways motion.
-Trajectory2 WindingDrive() {
-  Trajectory2 X_WBs;
-  Pose2 X_WB(3.0, -2.0, 2.5);
-  for (int i = 0; i < 600; ++i) {
-    X_WBs.push_back({.time_ns = i * kStepNs, .X_WB = X_WB});
-    const double t = 0.05 * i;
-    const double speed = 0.8 + 1.0 * std::sin(0.3 * t);
-    const double yaw_rate = 0.6 * std::sin(0.17 * t) + 0.2 * std::cos(0.9 * t);
-    X_WB = X_WB * Pose2::Exp(0.05 * Eigen::Vector3d(speed, 0.0, yaw_rate));
-  }
-  return X_WBs;
-}
 
 OdometryConfig TicksVehicle() {
   OdometryConfig config;
@@ -148,7 +133,7 @@ TEST(WheelSimulatorErrorsTest, RadiusErrorsScaleTheDistance) {
   // Only straight on: with both wheels off by different parts, the path is a wide arc.
   Trajectory2 X_WBs;
   for (int i = 0; i < 100; ++i)
-    X_WBs.push_back({.time_ns = i * kStepNs, .X_WB = Pose2(0.05 * i, 0.0, 0.0)});
+    X_WBs.push_back({.time_ns = i * kWindingStepNs, .X_WB = Pose2(0.05 * i, 0.0, 0.0)});
   const OdometryConfig config = TicksVehicle();
   const DbcFile dbc = Parse(kWheelTicksDbc);
   const WheelSimulationOptions options{
@@ -187,7 +172,7 @@ TEST(WheelSimulatorErrorsTest, NamesWhatIsWrong) {
 TEST(WheelSimulatorErrorsTest, NamesASpeedThatTheSignalCannotHold) {
   Trajectory2 X_WBs;
   for (int i = 0; i < 10; ++i)
-    X_WBs.push_back({.time_ns = i * kStepNs, .X_WB = Pose2(5.0 * i, 0.0, 0.0)});  // 100 m/s
+    X_WBs.push_back({.time_ns = i * kWindingStepNs, .X_WB = Pose2(5.0 * i, 0.0, 0.0)});  // 100 m/s
   const auto drive = SimulateWheels(X_WBs, SpeedVehicle(), Parse(kSpeedsDbc), {});
   ASSERT_FALSE(drive);
   EXPECT_THAT(drive.error().message, testing::StartsWith("signal LEFT cannot hold 100"));
