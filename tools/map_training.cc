@@ -1,10 +1,17 @@
 #include "map_training.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <iterator>
+#include <mutex>
+#include <numeric>
+#include <optional>
+#include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -84,39 +91,69 @@ void RoundAsStored(std::vector<float>& values) {
   std::transform(values.begin(), values.end(), values.begin(), RoundToHalf);
 }
 
-/// The region's head, and the whitening that goes with it.
-Result<MapRegion> TrainRegion(const std::vector<TrainingImage>& images,
-                              const std::string& name,
-                              const MapTrainingOptions& options,
-                              SceneMap& map) {
-  const PinholeCamera camera(map.camera);
-  TrainingSetConfig cells = options.cells;
-  cells.seed = options.seed;
-  cells.threads = options.threads;
-  if (!map.regions.empty()) cells.whitening = &map.whitening;
-  Result<PreparedTraining> prepared = [&] {
-    ProgressLine line(name + ": features and depths");
-    return PrepareTraining(
-        images, camera, map.features, cells, [&](double done) { line.Show(done, ""); });
-  }();
-  if (!prepared) return std::move(prepared).error();
-  if (map.regions.empty()) {
-    map.whitening = std::move(prepared->whitening);
-    RoundAsStored(map.whitening.mean);
-    RoundAsStored(map.whitening.basis);
+/// Copies of features and head, in shares of a region's whole time.
+constexpr double kPreparationShare = 0.15;
+/// Images that the whitening is fitted to, from all along the route.
+constexpr std::size_t kWhiteningImages = 240;
+
+/// Shows how far the training of all regions is, from several threads.
+class TrainingProgressLine {
+ public:
+  explicit TrainingProgressLine(std::size_t regions) : line_("training"), done_(regions) {}
+
+  void Show(std::size_t region, double done, std::string_view detail) {
+    const std::lock_guard lock(mutex_);
+    done_[region] = done;
+    const double sum = std::accumulate(done_.begin(), done_.end(), 0.0);
+    const auto finished = std::count_if(
+        done_.begin(), done_.end(), [](double region_done) { return region_done >= 1.0; });
+    line_.Show(
+        sum / static_cast<double>(done_.size()),
+        fmt::format("{} of {} regions done; region{}: {}", finished, done_.size(), region, detail));
   }
 
-  HeadTrainerConfig config = options.head;
-  config.seed = options.seed;
-  config.threads = options.threads;
-  config.shape.inputs = prepared->set.dimension;
-  ProgressLine line(name + ": training");
-  auto head = TrainHead(prepared->set, config, [&](const TrainingProgress& progress) {
-    line.Show(static_cast<double>(progress.iteration) / progress.iterations,
-              fmt::format("loss {:.2f}, error {:.1f} px, valid {:.0f} %",
-                          progress.loss,
-                          progress.median_error_px,
-                          100.0 * progress.valid));
+ private:
+  std::mutex mutex_;
+  ProgressLine line_;
+  std::vector<double> done_;  ///< Of each region, in [0, 1].
+};
+
+/// What the training of a region needs besides its frames.
+struct RegionTraining {
+  const SceneMap& map;  ///< Camera, features and whitening.
+  const MapTrainingOptions& options;
+  int threads = 1;
+};
+
+/// The region's head. `show` is called with the share done and a few words, by one thread at a
+/// time.
+Result<MapRegion> TrainRegion(const RegionFrames& frames,
+                              const RegionTraining& training,
+                              const std::function<void(double, std::string_view)>& show) {
+  const SceneMap& map = training.map;
+  const auto images =
+      LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
+  if (!images) return images.error();
+  TrainingSetConfig cells = training.options.cells;
+  cells.seed = training.options.seed;
+  cells.threads = training.threads;
+  const auto set = PrepareTraining(
+      *images, PinholeCamera(map.camera), map.features, map.whitening, cells, [&](double done) {
+        show(kPreparationShare * done, "features and depths");
+      });
+  if (!set) return set.error();
+
+  HeadTrainerConfig config = training.options.head;
+  config.seed = training.options.seed;
+  config.threads = training.threads;
+  config.shape.inputs = set->dimension;
+  auto head = TrainHead(*set, config, [&](const TrainingProgress& progress) {
+    show(kPreparationShare + (1.0 - kPreparationShare) * static_cast<double>(progress.iteration) /
+                                 progress.iterations,
+         fmt::format("loss {:.2f}, error {:.1f} px, valid {:.0f} %",
+                     progress.loss,
+                     progress.median_error_px,
+                     100.0 * progress.valid));
   });
   if (!head) return std::move(head).error();
   for (HeadLayer& layer : head->layers) {
@@ -124,10 +161,72 @@ Result<MapRegion> TrainRegion(const std::vector<TrainingImage>& images,
     RoundAsStored(layer.bias);
   }
   MapRegion region;
-  region.name = name;
   region.head = std::move(*head);
-  region.training_poses = CoarsePoses(images);
+  region.training_poses = CoarsePoses(*images);
   return region;
+}
+
+/// Trains the heads side by side, each on a thread of its own: threads that share one head wait for
+/// each other at every step. With fewer regions than threads, a head has several.
+Result<void> TrainRegions(const std::vector<RegionFrames>& regions,
+                          const MapTrainingOptions& options,
+                          SceneMap& map) {
+  const std::size_t workers = std::min<std::size_t>(options.threads, regions.size());
+  const RegionTraining training{map, options, options.threads / static_cast<int>(workers)};
+  TrainingProgressLine line(regions.size());
+  std::vector<std::optional<Result<MapRegion>>> trained(regions.size());
+  std::atomic<std::size_t> next = 0;
+  std::atomic<bool> has_failed = false;
+  const auto work = [&] {
+    for (std::size_t index = next++; index < regions.size() && !has_failed; index = next++) {
+      trained[index] =
+          TrainRegion(regions[index], training, [&](double done, std::string_view detail) {
+            line.Show(index, done, detail);
+          });
+      if (!*trained[index]) has_failed = true;
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (std::size_t worker = 1; worker < workers; ++worker) {
+      others.emplace_back(work);
+    }
+    work();
+  }
+  for (const auto& region : trained) {
+    if (region && !*region) return region->error();
+  }
+  for (std::size_t index = 0; index < regions.size(); ++index) {
+    map.regions.push_back(std::move(**trained[index]));
+    map.regions.back().name = fmt::format("region{}", index);
+  }
+  return {};
+}
+
+/// Fitted to images from all along the route, of all drives.
+Result<FeatureWhitening> FitRouteWhitening(const std::vector<RouteFrame>& route,
+                                           const MapTrainingOptions& options,
+                                           const SceneMap& map) {
+  std::vector<RouteFrame> frames;
+  std::copy_if(route.begin(), route.end(), std::back_inserter(frames), [](const RouteFrame& frame) {
+    return !frame.is_held_out;
+  });
+  std::vector<RouteFrame> sample;
+  const std::size_t count = std::min(frames.size(), kWhiteningImages);
+  for (std::size_t index = 0; index < count; ++index) {
+    sample.push_back(frames[index * frames.size() / count]);
+  }
+  auto images = LoadImages(sample, map.camera, Pose3());
+  if (!images) return std::move(images).error();
+  std::vector<GrayImage> pictures;
+  for (TrainingImage& image : *images) {
+    pictures.push_back(std::move(image.image));
+  }
+  auto whitening = FitWhiteningToImages(pictures, map.features, options.whitened_dimensions);
+  if (!whitening) return std::move(whitening).error();
+  RoundAsStored(whitening->mean);
+  RoundAsStored(whitening->basis);
+  return whitening;
 }
 
 /// How much the covariances must grow, and from which confidence poses are right, by frames that
@@ -183,6 +282,9 @@ Result<void> MapTrainingOptions::Validate() const {
   if (threads < 1 || threads > 256) return must("--threads", threads, "in [1, 256]");
   if (held_out_every < 2) return must("--held-out-every", held_out_every, "at least 2");
   if (!(region_length_m >= 10.0)) return must("--region-length", region_length_m, "at least 10 m");
+  if (whitened_dimensions < 1) {
+    return must("whitened dimensions", whitened_dimensions, "at least 1");
+  }
   if (cells.views_per_image < 1) return must("--views", cells.views_per_image, "at least 1");
   return {};
 }
@@ -205,18 +307,18 @@ Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
   map.camera = first.intrinsics;
   map.R_WD = *R_WD;
   map.features = GradientHistogramsForImage(map.camera.width, map.camera.height);
-  std::vector<DatasetFrame> held_out;
-  for (const RegionFrames& frames :
-       DivideRoute(*route, options.region_length_m, options.region_overlap_m)) {
-    const auto images =
-        LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
-    if (!images) return images.error();
-    auto region = TrainRegion(*images, fmt::format("region{}", map.regions.size()), options, map);
-    if (!region) return std::move(region).error();
-    map.regions.push_back(std::move(*region));
+  auto whitening = FitRouteWhitening(*route, options, map);
+  if (!whitening) return std::move(whitening).error();
+  map.whitening = std::move(*whitening);
+  const std::vector<RegionFrames> regions =
+      DivideRoute(*route, options.region_length_m, options.region_overlap_m);
+  if (auto done = TrainRegions(regions, options, map); !done) return std::move(done).error();
+  for (const RegionFrames& frames : regions) {
     map.training.training_frames += static_cast<std::uint32_t>(frames.training.size());
-    for (const RouteFrame& frame : frames.held_out)
-      held_out.push_back(frame.frame);
+  }
+  std::vector<DatasetFrame> held_out;
+  for (const RouteFrame& frame : *route) {
+    if (frame.is_held_out) held_out.push_back(frame.frame);
   }
 
   if (auto calibrated = CalibrateRegions(held_out, options.threads, map); !calibrated) {

@@ -18,7 +18,8 @@ struct MapTrainingOptions {
   std::uint64_t seed = 1;
   double region_length_m = 150.0;  ///< Longer routes are divided.
   double region_overlap_m = 20.0;
-  int held_out_every = 8;  ///< Of the training frames; measures the map, never trains it.
+  int held_out_every = 8;         ///< Of the training frames; measures the map, never trains it.
+  int whitened_dimensions = 192;  ///< Of the features, as the heads see them.
   TrainingSetConfig cells;
   HeadTrainerConfig head;
 

@@ -31,6 +31,8 @@ constexpr std::size_t kNeighbours = 6;
 constexpr double kMaxTurnRad = 0.5;
 constexpr double kMinBaselineM = 0.3;
 constexpr std::size_t kWhiteningCellsPerImage = 150;
+/// More of an image's cells to choose those from.
+constexpr std::size_t kWhiteningCandidates = 1600;
 /// A cell takes the depth of a measured one that is at most this far, in cells.
 constexpr float kDepthReach = 0.75F;
 
@@ -38,7 +40,6 @@ constexpr float kDepthReach = 0.75F;
 struct BaseCells {
   std::vector<Eigen::Vector2f> working_pixels;
   std::vector<float> inverse_depths;
-  std::vector<float> samples;  ///< Features for the whitening.
 };
 
 /// The cells of one image's copies.
@@ -89,10 +90,15 @@ class Preparation {
   Preparation(const std::vector<TrainingImage>& images,
               const PinholeCamera& camera,
               const GradientHistogramsConfig& features,
+              const FeatureWhitening& whitening,
               const TrainingSetConfig& config)
-      : images_(images), camera_(camera), features_(features), config_(config) {}
+      : images_(images),
+        camera_(camera),
+        features_(features),
+        whitening_(whitening),
+        config_(config) {}
 
-  Result<PreparedTraining> Run(const std::function<void(double)>& progress);
+  TrainingSet Run(const std::function<void(double)>& progress);
 
  private:
   struct ViewState {
@@ -126,8 +132,8 @@ class Preparation {
   const std::vector<TrainingImage>& images_;
   const PinholeCamera& camera_;
   const GradientHistogramsConfig& features_;
+  const FeatureWhitening& whitening_;
   const TrainingSetConfig& config_;
-  FeatureWhitening whitening_;
 };
 
 std::vector<BaseCells> Preparation::MeasureChunk(std::size_t chunk) const {
@@ -148,12 +154,6 @@ std::vector<BaseCells> Preparation::MeasureChunk(std::size_t chunk) const {
     if (image < begin || image >= end) continue;
     BaseCells& base = bases.emplace_back();
     base.working_pixels = cells.pixels;
-    const std::size_t stride = std::max<std::size_t>(1, cells.size() / kWhiteningCellsPerImage);
-    const auto dimension = static_cast<std::size_t>(cells.dimension);
-    for (std::size_t cell = 0; cell < cells.size(); cell += stride) {
-      const auto from = cells.values.begin() + static_cast<std::ptrdiff_t>(cell * dimension);
-      base.samples.insert(base.samples.end(), from, from + cells.dimension);
-    }
   }
   for (std::size_t image = begin; image < end; ++image) {
     BaseCells& base = bases[image - begin];
@@ -305,7 +305,7 @@ double MedianDepth(const std::vector<BaseCells>& bases) {
   return 1.0 / *middle;
 }
 
-Result<PreparedTraining> Preparation::Run(const std::function<void(double)>& progress) {
+TrainingSet Preparation::Run(const std::function<void(double)>& progress) {
   const std::size_t chunks = (images_.size() + kChunk - 1) / kChunk;
   ProgressCounter counter(2 * images_.size(), progress);
   std::vector<std::vector<BaseCells>> chunk_bases(chunks);
@@ -315,27 +315,14 @@ Result<PreparedTraining> Preparation::Run(const std::function<void(double)>& pro
     counter.Add(chunk_bases[chunk].size());
   });
   std::vector<BaseCells> bases;
-  std::vector<float> samples;
   for (std::vector<BaseCells>& chunk : chunk_bases) {
-    for (BaseCells& base : chunk) {
-      samples.insert(samples.end(), base.samples.begin(), base.samples.end());
-      bases.push_back(std::move(base));
-    }
+    std::move(chunk.begin(), chunk.end(), std::back_inserter(bases));
   }
 
-  if (config_.whitening != nullptr) {
-    whitening_ = *config_.whitening;
-  } else {
-    const int dimension = MakeExtractor()->dimension();
-    auto whitening = FitWhitening(samples, dimension, config_.whitened_dimensions);
-    if (!whitening) return std::move(whitening).error();
-    whitening_ = std::move(*whitening);
-  }
-
-  PreparedTraining prepared;
-  prepared.set.dimension = whitening_.outputs;
-  prepared.set.focal_px = camera_.intrinsics().fx * features_.working_width / features_.image_width;
-  prepared.set.typical_depth_m = MedianDepth(bases);
+  TrainingSet set;
+  set.dimension = whitening_.outputs;
+  set.focal_px = camera_.intrinsics().fx * features_.working_width / features_.image_width;
+  set.typical_depth_m = MedianDepth(bases);
   std::vector<ViewCells> views(images_.size());
   const auto make_state = [&] {
     auto state = std::make_unique<ViewState>();
@@ -352,48 +339,72 @@ Result<PreparedTraining> Preparation::Run(const std::function<void(double)>& pro
   for (const ViewCells& view : views) {
     cells += view.targets.size();
   }
-  prepared.set.targets.reserve(cells);
-  prepared.set.features.reserve(cells * static_cast<std::size_t>(whitening_.outputs));
+  set.targets.reserve(cells);
+  set.features.reserve(cells * static_cast<std::size_t>(whitening_.outputs));
   for (ViewCells& view : views) {
-    prepared.set.targets.insert(
-        prepared.set.targets.end(), view.targets.begin(), view.targets.end());
-    prepared.set.features.insert(
-        prepared.set.features.end(), view.features.begin(), view.features.end());
+    set.targets.insert(set.targets.end(), view.targets.begin(), view.targets.end());
+    set.features.insert(set.features.end(), view.features.begin(), view.features.end());
     view = {};
   }
   for (const TrainingImage& image : images_) {
-    prepared.set.X_WCs.push_back(image.X_WC);
+    set.X_WCs.push_back(image.X_WC);
   }
-  prepared.whitening = std::move(whitening_);
-  return prepared;
+  return set;
 }
 
-Result<void> CheckImages(const std::vector<TrainingImage>& images,
-                         const GradientHistogramsConfig& features) {
-  for (std::size_t index = 0; index < images.size(); ++index) {
-    const GrayImage& image = images[index].image;
-    if (image.width == features.image_width && image.height == features.image_height) continue;
-    return Error{ErrorKind::kInvalidInput,
-                 fmt::format("training image {} is {} x {} pixels, must be {} x {}",
-                             index,
-                             image.width,
-                             image.height,
-                             features.image_width,
-                             features.image_height)};
-  }
-  return {};
+Result<void> CheckImage(const GrayImage& image,
+                        std::size_t index,
+                        const GradientHistogramsConfig& features) {
+  if (image.width == features.image_width && image.height == features.image_height) return {};
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("training image {} is {} x {} pixels, must be {} x {}",
+                           index,
+                           image.width,
+                           image.height,
+                           features.image_width,
+                           features.image_height)};
 }
 
 }  // namespace
 
-Result<PreparedTraining> PrepareTraining(const std::vector<TrainingImage>& images,
-                                         const PinholeCamera& camera,
-                                         const GradientHistogramsConfig& features,
-                                         const TrainingSetConfig& config,
-                                         const std::function<void(double)>& progress) {
+Result<FeatureWhitening> FitWhiteningToImages(const std::vector<GrayImage>& images,
+                                              const GradientHistogramsConfig& features,
+                                              int outputs) {
+  auto extractor = GradientHistograms::Create(features);
+  if (!extractor) return std::move(extractor).error();
+  std::vector<float> samples;
+  CellFeatures cells;
+  for (std::size_t index = 0; index < images.size(); ++index) {
+    if (auto valid = CheckImage(images[index], index, features); !valid) return valid.error();
+    const auto extracted = (*extractor)->Extract(images[index], kWhiteningCandidates, cells);
+    RELOCD_CHECK(extracted.has_value(), "the image's size has been checked");
+    const std::size_t stride = std::max<std::size_t>(1, cells.size() / kWhiteningCellsPerImage);
+    const auto dimension = static_cast<std::size_t>(cells.dimension);
+    for (std::size_t cell = 0; cell < cells.size(); cell += stride) {
+      const auto from = cells.values.begin() + static_cast<std::ptrdiff_t>(cell * dimension);
+      samples.insert(samples.end(), from, from + cells.dimension);
+    }
+  }
+  return FitWhitening(samples, (*extractor)->dimension(), outputs);
+}
+
+Result<TrainingSet> PrepareTraining(const std::vector<TrainingImage>& images,
+                                    const PinholeCamera& camera,
+                                    const GradientHistogramsConfig& features,
+                                    const FeatureWhitening& whitening,
+                                    const TrainingSetConfig& config,
+                                    const std::function<void(double)>& progress) {
   if (auto valid = Validate(features); !valid) return std::move(valid).error();
-  if (auto valid = CheckImages(images, features); !valid) return std::move(valid).error();
-  return Preparation(images, camera, features, config).Run(progress);
+  if (whitening.inputs != GradientHistogramsDimension(features)) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("whitening.inputs is {}, must be {} as the features'",
+                             whitening.inputs,
+                             GradientHistogramsDimension(features))};
+  }
+  for (std::size_t index = 0; index < images.size(); ++index) {
+    if (auto valid = CheckImage(images[index].image, index, features); !valid) return valid.error();
+  }
+  return Preparation(images, camera, features, whitening, config).Run(progress);
 }
 
 }  // namespace relocd

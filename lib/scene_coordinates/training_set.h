@@ -42,34 +42,36 @@ struct TrainingSet {
 };
 
 struct TrainingSetConfig {
-  int cells_per_view = 1600;      ///< > 0
-  int views_per_image = 6;        ///< > 0; the first is the image as it is.
-  int whitened_dimensions = 192;  ///< > 0
-  double max_scale = 1.35;        ///< >= 1; copies are enlarged or reduced by up to this factor.
-  double max_roll_rad = 0.12;     ///< >= 0
-  double max_blur_px = 1.2;       ///< >= 0; standard deviation in working pixels.
-  LightChanges light;             ///< Of the copies.
-  bool measure_depth = true;      ///< Find depths between neighbouring images by their poses.
-  /// Used instead of fitting one, if there is one: all regions of a map share theirs.
-  const FeatureWhitening* whitening = nullptr;
+  int cells_per_view = 1600;   ///< > 0
+  int views_per_image = 6;     ///< > 0; the first is the image as it is.
+  double max_scale = 1.35;     ///< >= 1; copies are enlarged or reduced by up to this factor.
+  double max_roll_rad = 0.12;  ///< >= 0
+  double max_blur_px = 1.2;    ///< >= 0; standard deviation in working pixels.
+  LightChanges light;          ///< Of the copies.
+  bool measure_depth = true;   ///< Find depths between neighbouring images by their poses.
   std::uint64_t seed = 1;
   int threads = 1;  ///< > 0; the result does not depend on it.
 };
 
-/// The cells, and the whitening that was fitted to them.
-struct PreparedTraining {
-  TrainingSet set;
-  FeatureWhitening whitening;
-};
+/// The whitening of a map, which all its regions share: fitted to a sample of these images' cells.
+///
+/// @param images  a few hundred from all along the route say enough.
+/// @param outputs  dimensions that are kept, > 0.
+/// @return kInvalidInput when an image has not the configured size, or there are too few cells.
+Result<FeatureWhitening> FitWhiteningToImages(const std::vector<GrayImage>& images,
+                                              const GradientHistogramsConfig& features,
+                                              int outputs);
 
 /// Extracts, measures depths and whitens. `progress` is called with the share done, from one
 /// thread at a time.
 ///
-/// @return kInvalidInput when an image has not the configured size, or there are too few cells.
-Result<PreparedTraining> PrepareTraining(const std::vector<TrainingImage>& images,
-                                         const PinholeCamera& camera,
-                                         const GradientHistogramsConfig& features,
-                                         const TrainingSetConfig& config,
-                                         const std::function<void(double)>& progress);
+/// @param whitening  of this extractor's features.
+/// @return kInvalidInput when an image has not the configured size.
+Result<TrainingSet> PrepareTraining(const std::vector<TrainingImage>& images,
+                                    const PinholeCamera& camera,
+                                    const GradientHistogramsConfig& features,
+                                    const FeatureWhitening& whitening,
+                                    const TrainingSetConfig& config,
+                                    const std::function<void(double)>& progress);
 
 }  // namespace relocd

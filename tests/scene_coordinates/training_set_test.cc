@@ -20,76 +20,100 @@ TrainingSetConfig TestConfig() {
   TrainingSetConfig config;
   config.cells_per_view = 400;
   config.views_per_image = 2;
-  config.whitened_dimensions = 48;
   return config;
 }
 
-Result<PreparedTraining> Prepare(const std::vector<TrainingImage>& images,
-                                 const TrainingSetConfig& config) {
+FeatureWhitening Whitening(const std::vector<TrainingImage>& drive) {
+  std::vector<GrayImage> images;
+  for (const TrainingImage& image : drive) {
+    images.push_back(image.image);
+  }
+  return FitWhiteningToImages(images, WallScene::Features(), 48).value();
+}
+
+Result<TrainingSet> Prepare(const std::vector<TrainingImage>& images,
+                            const FeatureWhitening& whitening,
+                            const TrainingSetConfig& config) {
   const PinholeCamera camera(WallScene::Intrinsics());
-  return PrepareTraining(images, camera, WallScene::Features(), config, {});
+  return PrepareTraining(images, camera, WallScene::Features(), whitening, config, {});
 }
 
 TEST(TrainingSetTest, KnowsWhereEachCellLooksAlsoInChangedCopies) {
   const std::vector<TrainingImage> images = WallScene().Drive(6);
-  const auto prepared = Prepare(images, TestConfig());
-  ASSERT_TRUE(prepared) << prepared.error().message;
-  const TrainingSet& set = prepared->set;
-  EXPECT_EQ(set.features.size(), set.targets.size() * 48);
-  EXPECT_GT(set.targets.size(), 6U * 400U);
-  EXPECT_NEAR(set.typical_depth_m, 8.2, 0.5);
+  const auto set = Prepare(images, Whitening(images), TestConfig());
+  ASSERT_TRUE(set) << set.error().message;
+  EXPECT_EQ(set->features.size(), set->targets.size() * 48);
+  EXPECT_GT(set->targets.size(), 6U * 400U);
+  EXPECT_NEAR(set->typical_depth_m, 8.2, 0.5);
   int known = 0;
   int right = 0;
-  for (const TrainingTarget& target : set.targets) {
+  for (const TrainingTarget& target : set->targets) {
     if (target.inverse_depth == 0.0F) continue;
     ++known;
     const double depth = WallScene::Depth(images[target.image].X_WC, {target.x, target.y});
     if (std::abs(depth * static_cast<double>(target.inverse_depth) - 1.0) < 0.1) ++right;
   }
-  EXPECT_GT(known, static_cast<int>(set.targets.size()) / 3);
+  EXPECT_GT(known, static_cast<int>(set->targets.size()) / 3);
   EXPECT_GT(right, known * 8 / 10);
 }
 
 TEST(TrainingSetTest, TheNumberOfThreadsDoesNotChangeTheSet) {
   const std::vector<TrainingImage> images = WallScene().Drive(4);
+  const FeatureWhitening whitening = Whitening(images);
   TrainingSetConfig config = TestConfig();
-  const auto one = Prepare(images, config);
+  const auto one = Prepare(images, whitening, config);
   config.threads = 3;
-  const auto three = Prepare(images, config);
+  const auto three = Prepare(images, whitening, config);
   ASSERT_TRUE(one && three);
-  ASSERT_EQ(one->set.features.size(), three->set.features.size());
-  EXPECT_EQ(std::memcmp(one->set.features.data(),
-                        three->set.features.data(),
-                        one->set.features.size() * sizeof(Bfloat16)),
-            0);
-  EXPECT_EQ(one->whitening.basis, three->whitening.basis);
+  ASSERT_EQ(one->features.size(), three->features.size());
+  EXPECT_EQ(
+      std::memcmp(
+          one->features.data(), three->features.data(), one->features.size() * sizeof(Bfloat16)),
+      0);
 }
 
 TEST(TrainingSetTest, RefusesAnImageOfAnotherSize) {
-  std::vector<TrainingImage> images = WallScene().Drive(3);
+  std::vector<TrainingImage> images = WallScene().Drive(4);
+  const FeatureWhitening whitening = Whitening(images);
   images[2].image = Texture(1).Image(64, 64);
-  const auto prepared = Prepare(images, TestConfig());
+  const auto prepared = Prepare(images, whitening, TestConfig());
   ASSERT_FALSE(prepared);
   EXPECT_THAT(prepared.error().message,
               HasSubstr("training image 2 is 64 x 64 pixels, must be 240 x 160"));
+  const auto fitted =
+      FitWhiteningToImages({images[0].image, images[2].image}, WallScene::Features(), 48);
+  ASSERT_FALSE(fitted);
+  EXPECT_THAT(fitted.error().message,
+              HasSubstr("training image 1 is 64 x 64 pixels, must be 240 x 160"));
+}
+
+TEST(TrainingSetTest, RefusesTheWhiteningOfOtherFeatures) {
+  const std::vector<TrainingImage> images = WallScene().Drive(4);
+  FeatureWhitening whitening = Whitening(images);
+  whitening.inputs = 17;
+  const auto prepared = Prepare(images, whitening, TestConfig());
+  ASSERT_FALSE(prepared);
+  EXPECT_THAT(prepared.error().message, HasSubstr("whitening.inputs is 17, must be"));
 }
 
 /// The whole way: a map is made of a drive along the wall, and finds points in a view between.
 TEST(SceneCoordinatePredictorTest, FindsThePointsOfAViewThatWasNotTrained) {
   const WallScene wall;
-  const auto prepared = Prepare(wall.Drive(8), TestConfig());
-  ASSERT_TRUE(prepared);
+  const std::vector<TrainingImage> drive = wall.Drive(8);
+  const FeatureWhitening whitening = Whitening(drive);
+  const auto set = Prepare(drive, whitening, TestConfig());
+  ASSERT_TRUE(set);
   HeadTrainerConfig trainer;
   trainer.shape = {.inputs = 48, .width = 64, .blocks = 1};
   trainer.iterations = 400;
   trainer.batch = 512;
-  auto head = TrainHead(prepared->set, trainer, {});
+  auto head = TrainHead(*set, trainer, {});
   ASSERT_TRUE(head) << head.error().message;
   SceneMap map;
   map.camera = WallScene::Intrinsics();
   map.features = WallScene::Features();
   map.cells_per_image = 200;
-  map.whitening = prepared->whitening;
+  map.whitening = whitening;
   map.regions.emplace_back().head = std::move(*head);
 
   const TrainingImage view = wall.View(Pose3(Eigen::Quaterniond::Identity(), {1.4, 0.05, 0.0}));

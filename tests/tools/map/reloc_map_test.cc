@@ -29,7 +29,10 @@ struct Outcome {
 /// A drive along the wall as a data set, and the program run in it.
 class RelocMapTest : public testing::Test {
  protected:
-  void SetUp() override {
+  void SetUp() override { WriteDrive(1.0); }
+
+  /// @param stretch  of the poses: more than 1 makes the wall contradict them, but the route long.
+  void WriteDrive(double stretch) const {
     constexpr int kFrames = 9;
     std::string frames;
     std::string poses;
@@ -40,7 +43,7 @@ class RelocMapTest : public testing::Test {
       const std::string name = fmt::format("images/{:02}.jpg", index);
       folder_.Write(name, {reinterpret_cast<const char*>(jpeg.data()), jpeg.size()});
       frames += name + "\n";
-      const Eigen::Vector3d& t = view.X_WC.translation();
+      const Eigen::Vector3d t = stretch * view.X_WC.translation();
       poses += fmt::format("{:.1f} {} {} {} 0 0 0 1\n", 0.1 * index, t.x(), t.y(), t.z());
     }
     folder_.Write("frames.txt", frames);
@@ -88,6 +91,17 @@ TEST_F(RelocMapTest, TrainsAMapThatLocalizeAndInfoRead) {
 
   ASSERT_EQ(Run(train + "b.relocmap").exit_code, kExitOk);
   EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("b.relocmap")).value());
+}
+
+TEST_F(RelocMapTest, TheNumberOfThreadsDoesNotChangeAMapOfSeveralRegions) {
+  WriteDrive(20.0);
+  const std::string train = "train --dataset . --iterations 2 --views 2 --region-length 10 ";
+  const Outcome one = Run(train + "--threads 1 --out a.relocmap");
+  ASSERT_EQ(one.exit_code, kExitOk) << one.output;
+  const Outcome five = Run(train + "--threads 5 --out b.relocmap");
+  ASSERT_EQ(five.exit_code, kExitOk) << five.output;
+  EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("b.relocmap")).value());
+  EXPECT_THAT(Run("info a.relocmap").output, HasSubstr("region2"));
 }
 
 TEST_F(RelocMapTest, RefusesAMapThatIsMissingOrNone) {
