@@ -66,7 +66,11 @@ class CanSocketKernelTest : public testing::Test {
     if (::ioctl(node_.get(), SIOCGIFFLAGS, &request) != 0) return false;
     const int flags = up ? request.ifr_flags | IFF_UP : request.ifr_flags & ~IFF_UP;
     request.ifr_flags = static_cast<short>(flags);
-    return ::ioctl(node_.get(), SIOCSIFFLAGS, &request) == 0;
+    if (::ioctl(node_.get(), SIOCSIFFLAGS, &request) != 0) return false;
+    // The other node is told as well, by its next call unless the error is taken here.
+    int pending = 0;
+    socklen_t size = sizeof(pending);
+    return ::getsockopt(node_.get(), SOL_SOCKET, SO_ERROR, &pending, &size) == 0;
   }
 
   UniqueFd node_;
