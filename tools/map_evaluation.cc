@@ -1,14 +1,20 @@
 #include "map_evaluation.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
+#include <thread>
 #include <utility>
 
 #include "camera/jpeg.h"
 #include "core/file.h"
 #include "geometry/covariance.h"
+#include "relocalization/map_localizer.h"
 
 namespace relocd {
 namespace {
@@ -17,68 +23,55 @@ Pose3 TruthInMap(const SceneMap& map, const DatasetFrame& frame) {
   return Pose3(map.R_WD, Eigen::Vector3d::Zero()) * frame.X_WC;
 }
 
-/// Tries all regions on the image that the predictor has extracted.
-void LocalizeInRegions(const SceneMap& map,
-                       const std::vector<RegionCalibration>& calibrations,
-                       SceneCoordinatePredictor& predictor,
-                       FrameLocalization& result) {
-  const PinholeCamera camera(map.camera);
-  std::vector<Correspondence> correspondences;
-  for (std::size_t region = 0; region < map.regions.size(); ++region) {
-    correspondences.clear();
-    for (const ScenePrediction& prediction : predictor.Predict(region)) {
-      correspondences.push_back({prediction.pixel, prediction.p_WP});
-    }
-    const RegionCalibration& calibration =
-        calibrations.empty() ? map.regions[region].calibration : calibrations[region];
-    const auto seed = static_cast<std::uint64_t>(result.frame.index);
-    CameraPoseResult pose = EstimateCameraPose(
-        correspondences, camera, PoseOptionsFor(calibration), std::nullopt, seed);
-    const bool is_better =
-        (pose.status == CameraPoseStatus::kOk) > (result.pose.status == CameraPoseStatus::kOk) ||
-        ((pose.status == CameraPoseStatus::kOk) == (result.pose.status == CameraPoseStatus::kOk) &&
-         pose.confidence > result.pose.confidence);
-    if (region == 0 || is_better) {
-      result.pose = std::move(pose);
-      result.region = region;
-    }
-  }
+Result<FrameLocalization> LocalizeFrame(MapLocalizer& localizer, const DatasetFrame& frame) {
+  const auto bytes = ReadFile(frame.image_path);
+  if (!bytes) return bytes.error();
+  const auto start = std::chrono::steady_clock::now();
+  const auto image = DecodeJpegToGray(AsBytes(*bytes));
+  if (!image) return Error(image.error()).WithContext(frame.image_path);
+  const auto seed = static_cast<std::uint64_t>(frame.index);
+  const auto localization = localizer.LocalizeAnywhere(*image, seed);
+  if (!localization) return Error(localization.error()).WithContext(frame.image_path);
+  const auto elapsed = std::chrono::steady_clock::now() - start;
+  return FrameLocalization{
+      .frame = frame,
+      .pose = localization->pose,
+      .region = static_cast<std::size_t>(std::max(0, localization->region)),
+      .milliseconds = std::chrono::duration<double, std::milli>(elapsed).count()};
 }
 
 }  // namespace
 
-CameraPoseOptions PoseOptionsFor(const RegionCalibration& calibration) {
-  CameraPoseOptions options;
-  options.calibration = {.covariance_scale = calibration.covariance_factor,
-                         .translation_floor_sigma_m = calibration.sigma_floor_m,
-                         .rotation_floor_sigma_rad = calibration.sigma_floor_rad,
-                         .min_confidence = calibration.confidence_threshold};
-  return options;
-}
-
-Result<std::vector<FrameLocalization>> LocalizeFrames(
-    const SceneMap& map,
-    const std::vector<DatasetFrame>& frames,
-    const std::vector<RegionCalibration>& calibrations,
-    int threads) {
-  auto predictor = SceneCoordinatePredictor::Create(map, threads);
-  if (!predictor) return std::move(predictor).error();
-  std::vector<FrameLocalization> results;
-  for (const DatasetFrame& frame : frames) {
-    const auto bytes = ReadFile(frame.image_path);
-    if (!bytes) return bytes.error();
-    const auto start = std::chrono::steady_clock::now();
-    const auto image = DecodeJpegToGray(AsBytes(*bytes));
-    if (!image) return Error(image.error()).WithContext(frame.image_path);
-    if (auto extracted = (*predictor)->Extract(*image); !extracted) {
-      return Error(extracted.error()).WithContext(frame.image_path);
+Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
+                                                      const std::vector<DatasetFrame>& frames,
+                                                      int threads) {
+  std::vector<FrameLocalization> results(frames.size());
+  std::vector<std::optional<Error>> errors(static_cast<std::size_t>(threads));
+  std::atomic<std::size_t> next = 0;
+  const auto work = [&](std::optional<Error>& error) {
+    auto localizer = MapLocalizer::Create(map, {});
+    if (!localizer) {
+      error = std::move(localizer).error();
+      return;
     }
-    FrameLocalization result;
-    result.frame = frame;
-    LocalizeInRegions(map, calibrations, **predictor, result);
-    const auto elapsed = std::chrono::steady_clock::now() - start;
-    result.milliseconds = std::chrono::duration<double, std::milli>(elapsed).count();
-    results.push_back(std::move(result));
+    for (std::size_t index = next++; index < frames.size(); index = next++) {
+      auto result = LocalizeFrame(**localizer, frames[index]);
+      if (!result) {
+        error = std::move(result).error();
+        return;
+      }
+      results[index] = std::move(*result);
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    for (std::size_t thread = 1; thread < errors.size(); ++thread) {
+      others.emplace_back(work, std::ref(errors[thread]));
+    }
+    work(errors.front());
+  }
+  for (std::optional<Error>& error : errors) {
+    if (error) return std::move(*error);
   }
   return results;
 }

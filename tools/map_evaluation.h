@@ -1,22 +1,16 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "camera/dataset.h"
-#include "camera/pinhole_camera.h"
 #include "core/result.h"
 #include "geometry/pose3.h"
 #include "relocalization/camera_pose_estimator.h"
 #include "scene_coordinates/map_file.h"
-#include "scene_coordinates/scene_coordinate_predictor.h"
 
 namespace relocd {
-
-/// The pose options that a region's calibration asks for.
-CameraPoseOptions PoseOptionsFor(const RegionCalibration& calibration);
 
 /// What came out for one frame.
 struct FrameLocalization {
@@ -29,12 +23,10 @@ struct FrameLocalization {
 /// Finds the camera of each frame by itself, without knowing where the one before was: all regions
 /// are tried, and the pose with the most support is kept.
 ///
-/// @param calibrations  one a region, in place of the map's, or empty.
-Result<std::vector<FrameLocalization>> LocalizeFrames(
-    const SceneMap& map,
-    const std::vector<DatasetFrame>& frames,
-    const std::vector<RegionCalibration>& calibrations,
-    int threads);
+/// @param threads  each works on frames of its own; the result does not depend on them.
+Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
+                                                      const std::vector<DatasetFrame>& frames,
+                                                      int threads);
 
 /// Errors against the data set's poses.
 struct PoseErrors {

@@ -19,6 +19,7 @@
 
 #include "camera/jpeg.h"
 #include "camera/pinhole_camera.h"
+#include "features/gradient_histograms.h"
 #include "geometry/covariance.h"
 #include "map_route.h"
 #include "progress_line.h"
@@ -259,7 +260,7 @@ RegionCalibration Calibrate(const SceneMap& map, const std::vector<FrameLocaliza
 Result<void> CalibrateRegions(const std::vector<DatasetFrame>& held_out,
                               int threads,
                               SceneMap& map) {
-  const auto raw = LocalizeFrames(map, held_out, {}, threads);
+  const auto raw = LocalizeFrames(map, held_out, threads);
   if (!raw) return raw.error();
   for (std::size_t index = 0; index < map.regions.size(); ++index) {
     std::vector<FrameLocalization> of_region;
@@ -324,7 +325,7 @@ Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
   if (auto calibrated = CalibrateRegions(held_out, options.threads, map); !calibrated) {
     return std::move(calibrated).error();
   }
-  auto localizations = LocalizeFrames(map, held_out, {}, options.threads);
+  auto localizations = LocalizeFrames(map, held_out, options.threads);
   if (!localizations) return std::move(localizations).error();
   trained.localizations = std::move(*localizations);
   trained.held_out = MeasureErrors(map, trained.localizations);

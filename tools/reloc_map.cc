@@ -152,7 +152,7 @@ Result<int> Localize(const LocalizeCommand& command) {
   if (!map) return map.error();
   const auto selected = SelectFrames(command.frames, SplitPart::kTest);
   if (!selected) return selected.error();
-  const auto localizations = LocalizeFrames(*map, selected->dataset.frames, {}, command.threads);
+  const auto localizations = LocalizeFrames(*map, selected->dataset.frames, command.threads);
   if (!localizations) return localizations.error();
   if (auto written = WriteFileAtomically(command.out, FormatPoses(*map, *localizations));
       !written) {

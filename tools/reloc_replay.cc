@@ -97,10 +97,18 @@ class Replay {
 
   Result<void> AddInference() {
     const InferenceConfig& config = config_.inference;
-    auto localizer = MapLocalizer::Load(config.map_path, config.pose, config.threads);
+    auto localizer = MapLocalizer::Load(config);
     if (!localizer) return std::move(localizer).error();
-    inference_ = std::make_unique<InferenceNode>(
-        config, std::move(*localizer), bus_, kReplayRunId, [this] { return now_; });
+    inference_ = std::make_unique<InferenceNode>(config,
+                                                 std::move(*localizer),
+                                                 config_.CameraMountings(),
+                                                 bus_,
+                                                 kReplayRunId,
+                                                 [this] { return now_; });
+    bus_.Subscribe<localization_t>(
+        channels::kLocalization, Delivery::kNewest, [this](const localization_t& localization) {
+          inference_->Handle(localization);
+        });
     for (const auto& [camera, unused] : config_.cameras) {
       bus_.Subscribe<image_t>(
           ImageChannel(camera), Delivery::kEvery, [this, name = camera](const image_t& image) {
@@ -112,11 +120,9 @@ class Replay {
   }
 
   Result<void> AddSmoothing() {
-    std::map<std::string, Pose3> X_BC;
-    for (const auto& [name, camera] : config_.cameras)
-      X_BC[name] = camera.X_BC();
     smoother_ =
-        std::make_unique<SmootherNode>(config_.localization, std::move(X_BC), bus_, kReplayRunId);
+        std::make_unique<SmootherNode>(
+        config_.localization, config_.CameraMountings(), bus_, kReplayRunId);
     bus_.Subscribe<odometry_t>(channels::kOdometry,
                                Delivery::kEvery,
                                [this](const odometry_t& message) { smoother_->Handle(message); });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
@@ -12,11 +13,14 @@
 #include "relocd/camera_pose_t.hpp"
 
 #include "camera/jpeg.h"
+#include "geometry/planar.h"
 
 namespace relocd {
 namespace {
 
 constexpr std::size_t kMapIdDigits = 16;
+/// A localization that is farther from the image's time says little about it.
+constexpr double kLongestPredictionS = 2.0;
 constexpr std::int32_t kMjpeg = 0x47504A4D;  // "MJPG"
 
 /// The number that the first digits of a hash spell.
@@ -97,11 +101,13 @@ camera_pose_t EmptyAnswer() {
 
 InferenceNode::InferenceNode(const InferenceConfig& config,
                              std::unique_ptr<ImageLocalizer> localizer,
+                             std::map<std::string, Pose3> X_BCs,
                              MessageBus& bus,
                              std::int64_t run_id,
                              Clock clock)
     : config_(config),
       localizer_(std::move(localizer)),
+      X_BCs_(std::move(X_BCs)),
       bus_(bus),
       run_id_(run_id),
       clock_(std::move(clock)),
@@ -147,6 +153,38 @@ void InferenceNode::Handle(const std::string& camera, const image_t& image) {
   if (auto ok = bus_.Publish(channels::kCameraPose, answer); !ok) ++counters_.unpublished;
 }
 
+void InferenceNode::Handle(const localization_t& localization) {
+  localization_.reset();
+  switch (localization.status) {
+    case localization_t::CONVERGING:
+    case localization_t::OK:
+    case localization_t::DEAD_RECKONING:
+      break;
+    default:  // there is no pose, or it is not to be believed
+      return;
+  }
+  const Eigen::Map<const Eigen::Matrix3d> covariance(localization.covariance);
+  const Eigen::Vector3d pose(localization.x_WB_m, localization.y_WB_m, localization.yaw_WB_rad);
+  if (pose.allFinite() && covariance.allFinite()) localization_ = localization;
+}
+
+std::optional<CameraPrior> InferenceNode::Prior(const std::string& camera,
+                                                MonotonicTime image_time) const {
+  if (!localization_) return std::nullopt;
+  const auto mounting = X_BCs_.find(camera);
+  if (mounting == X_BCs_.end()) return std::nullopt;
+  const double ahead_s = ToSeconds(image_time - FromNanoseconds(localization_->mono_ns));
+  if (!(std::abs(ahead_s) < kLongestPredictionS)) return std::nullopt;
+  const Pose2 X_WB(localization_->x_WB_m, localization_->y_WB_m, localization_->yaw_WB_rad);
+  const Pose2 moved = X_WB * Pose2::Exp({localization_->speed_mps * ahead_s,
+                                         0.0,
+                                         localization_->yaw_rate_radps * ahead_s});
+  const Eigen::Map<const Eigen::Matrix3d> covariance(localization_->covariance);
+  return CameraPrior{.X_WC = LiftFromPlane(moved) * mounting->second,
+                     .sigma_m = std::sqrt(std::max(0.0, covariance.topLeftCorner<2, 2>().trace())),
+                     .sigma_rad = std::sqrt(std::max(0.0, covariance(2, 2)))};
+}
+
 void InferenceNode::Localize(const image_t& image, camera_pose_t& answer) {
   if (image.pixelformat != kMjpeg) {
     return SetReason(
@@ -177,8 +215,9 @@ void InferenceNode::Localize(const image_t& image, camera_pose_t& answer) {
   answer.decode_us = Microseconds(clock_().monotonic - start);
 
   const std::uint64_t seed = map_seed_ ^ static_cast<std::uint64_t>(answer.image_seq);
+  const std::optional<CameraPrior> prior = Prior(answer.camera, FromNanoseconds(answer.mono_ns));
   const Result<ImageLocalization> localization =
-      localizer_->Localize(*gray, seed, [this] { return clock_().monotonic; });
+      localizer_->Localize(*gray, prior, seed, [this] { return clock_().monotonic; });
   if (!localization) {
     return SetReason(camera_pose_t::STATUS_BAD_IMAGE, localization.error().message, answer);
   }
@@ -186,6 +225,8 @@ void InferenceNode::Localize(const image_t& image, camera_pose_t& answer) {
   answer.head_us = Microseconds(localization->head_time);
   answer.pose_us = Microseconds(localization->pose_time);
   answer.region = localization->region;
+  counters_.regions_tried += localization->regions_tried;
+  if (prior) ++counters_.priors;
   SetPose(localization->pose, answer);
 }
 
@@ -246,6 +287,8 @@ NodeStatus InferenceNode::Status(const ClockReading& now) const {
   add("low_confidence", counters_.low_confidence);
   add("degenerate", counters_.degenerate);
   add("poses", counters_.poses);
+  add("regions_tried", counters_.regions_tried);
+  add("priors", counters_.priors);
   add("unpublished", counters_.unpublished);
   status.Add("image_to_pose_p50_ms", age_ms_.Percentile(0.50));
   status.Add("image_to_pose_p99_ms", age_ms_.Percentile(0.99));

@@ -12,9 +12,14 @@ class InferenceDaemon final : public Daemon {
   InferenceDaemon(DaemonContext& context, std::unique_ptr<ImageLocalizer> localizer)
       : node_(context.config.inference,
               std::move(localizer),
+              context.config.CameraMountings(),
               context.control_bus,
               context.run_id,
               ReadClocks) {
+    context.control_bus.Subscribe<localization_t>(
+        channels::kLocalization, Delivery::kNewest, [this](const localization_t& localization) {
+          node_.Handle(localization);
+        });
     for (const auto& [camera, config] : context.config.cameras) {
       context.image_bus->Subscribe<image_t>(
           ImageChannel(camera), Delivery::kNewest, [this, name = camera](const image_t& image) {
@@ -31,7 +36,7 @@ class InferenceDaemon final : public Daemon {
 
 Result<std::unique_ptr<Daemon>> MakeInference(DaemonContext& context) {
   const InferenceConfig& config = context.config.inference;
-  auto localizer = MapLocalizer::Load(config.map_path, config.pose, config.threads);
+  auto localizer = MapLocalizer::Load(config);
   if (!localizer) return std::move(localizer).error().WithContext("inference");
   return std::unique_ptr<Daemon>(std::make_unique<InferenceDaemon>(context, std::move(*localizer)));
 }

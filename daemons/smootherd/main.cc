@@ -1,5 +1,4 @@
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,19 +23,12 @@ std::string ReadBootId() {
   return text ? std::string(Trim(*text)) : "";
 }
 
-std::map<std::string, Pose3> CameraMountings(const Config& config) {
-  std::map<std::string, Pose3> X_BC;
-  for (const auto& [name, camera] : config.cameras)
-    X_BC.emplace(name, camera.X_BC());
-  return X_BC;
-}
-
 class SmootherDaemon final : public Daemon {
  public:
   explicit SmootherDaemon(DaemonContext& context)
       : boot_id_(ReadBootId()),
         node_(context.config.localization,
-              CameraMountings(context.config),
+              context.config.CameraMountings(),
               context.control_bus,
               context.run_id) {}
 

@@ -77,6 +77,14 @@ Result<void> BusConfig::Validate() const {
   return {};
 }
 
+std::map<std::string, Pose3> Config::CameraMountings() const {
+  std::map<std::string, Pose3> X_BCs;
+  for (const auto& [name, camera] : cameras) {
+    X_BCs.emplace(name, camera.X_BC());
+  }
+  return X_BCs;
+}
+
 Result<void> Config::Validate() const {
   const auto check = [](const std::string& section, const auto& config) -> Result<void> {
     auto ok = config.Validate();

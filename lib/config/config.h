@@ -7,6 +7,7 @@
 #include "camera/camera_config.h"
 #include "can/can_config.h"
 #include "core/result.h"
+#include "geometry/pose3.h"
 #include "odometry/wheel_odometry.h"
 #include "recording/recorder_config.h"
 #include "relocalization/inference_config.h"
@@ -58,6 +59,9 @@ struct Config {
 
   /// @return kInvalidInput; the message begins with the full name of the key.
   [[nodiscard]] Result<void> Validate() const;
+
+  /// X_BC of each camera, by its name.
+  [[nodiscard]] std::map<std::string, Pose3> CameraMountings() const;
 };
 
 /// Reads, checks and completes a config.

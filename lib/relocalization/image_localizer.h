@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "camera/image.h"
@@ -9,6 +10,7 @@
 #include "core/result.h"
 #include "core/time.h"
 #include "relocalization/camera_pose_estimator.h"
+#include "relocalization/region_selector.h"
 
 namespace relocd {
 
@@ -16,6 +18,7 @@ namespace relocd {
 struct ImageLocalization {
   CameraPoseResult pose;
   int region = -1;  ///< Of the map, where the pose is from; -1 without a pose.
+  int regions_tried = 0;
   Duration features_time{};
   Duration head_time{};
   Duration pose_time{};
@@ -40,9 +43,12 @@ class ImageLocalizer {
   /// The sha256 of the map in hexadecimal.
   [[nodiscard]] virtual const std::string& map_id() const = 0;
 
+  /// @param prior  where the camera is expected, if that is known: tells where to look first, and
+  ///         competes on equal terms with what the image says.
   /// @param seed  of the random draws.
   /// @return kInvalidInput when the image has not the size of the map's camera.
   virtual Result<ImageLocalization> Localize(const GrayImage& image,
+                                             const std::optional<CameraPrior>& prior,
                                              std::uint64_t seed,
                                              const Clock& clock) = 0;
 };

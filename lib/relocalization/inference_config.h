@@ -11,6 +11,7 @@ namespace relocd {
 struct InferenceConfig {
   std::string map_path{};
   int threads = 1;
+  int regions_per_image = 3;
   int max_image_age_ms = 500;
   CameraPoseOptions pose;
 
@@ -21,6 +22,10 @@ struct InferenceConfig {
           self.threads,
           "in [1, 64]; of the network; they wait for each other actively, so no more than cores "
           "are free");
+    visit("regions_per_image",
+          self.regions_per_image,
+          "in [2, 1000]; regions of the map that are tried on an image at most; 7 ms each on one "
+          "thread");
     visit("max_image_age_ms",
           self.max_image_age_ms,
           "in [0, 60000]; older images are passed over, and counted; 0: none is too old, as when "

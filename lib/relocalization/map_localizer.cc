@@ -1,7 +1,6 @@
 #include "relocalization/map_localizer.h"
 
-#include <algorithm>
-#include <numeric>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -24,42 +23,48 @@ bool IsBetterPose(const CameraPoseResult& a, const CameraPoseResult& b) {
 
 }  // namespace
 
-MapLocalizer::MapLocalizer(SceneMap map, const CameraPoseOptions& options)
-    : map_(std::move(map)), camera_(map_.camera), options_(options) {}
+MapLocalizer::MapLocalizer(SceneMap map, const InferenceConfig& config)
+    : map_(std::move(map)),
+      camera_(map_.camera),
+      options_(config.pose),
+      selector_(map_.regions, static_cast<std::size_t>(config.regions_per_image)) {}
 
 Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Create(SceneMap map,
-                                                           const CameraPoseOptions& options,
-                                                           int threads) {
-  std::unique_ptr<MapLocalizer> localizer(new MapLocalizer(std::move(map), options));
-  auto predictor = SceneCoordinatePredictor::Create(localizer->map_, threads);
+                                                           const InferenceConfig& config) {
+  std::unique_ptr<MapLocalizer> localizer(new MapLocalizer(std::move(map), config));
+  auto predictor = SceneCoordinatePredictor::Create(localizer->map_, config.threads);
   if (!predictor) return std::move(predictor).error();
   localizer->predictor_ = std::move(*predictor);
   return localizer;
 }
 
-Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Load(const std::string& path,
-                                                         const CameraPoseOptions& options,
-                                                         int threads) {
-  if (path.empty()) {
+Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Load(const InferenceConfig& config) {
+  if (config.map_path.empty()) {
     return Error{ErrorKind::kInvalidInput,
                  "map_path is empty, must name a map (`reloc map train` makes one)"};
   }
-  auto map = ReadMap(path);
+  auto map = ReadMap(config.map_path);
   if (!map) return std::move(map).error();
-  return Create(std::move(*map), options, threads);
+  return Create(std::move(*map), config);
 }
 
-std::vector<std::size_t> MapLocalizer::RegionsToTry() const {
-  const std::size_t count = map_.regions.size();
-  const std::size_t first =
-      last_region_ ? *last_region_ - std::min<std::size_t>(*last_region_, 1) : 0;
-  const std::size_t end = last_region_ ? std::min(count, *last_region_ + 2) : count;
-  std::vector<std::size_t> regions(end - first);
-  std::iota(regions.begin(), regions.end(), first);
-  return regions;
+Pose3 MapLocalizer::AtTrainedHeight(const Pose3& X_WC) const {
+  double least = std::numeric_limits<double>::infinity();
+  double height_m = X_WC.translation().z();
+  for (const MapRegion& region : map_.regions) {
+    for (const TrainingPose& pose : region.training_poses) {
+      const double distance =
+          (pose.p_WC.cast<double>() - X_WC.translation()).head<2>().squaredNorm();
+      if (distance >= least) continue;
+      least = distance;
+      height_m = pose.p_WC.z();
+    }
+  }
+  return {X_WC.rotation(), {X_WC.translation().x(), X_WC.translation().y(), height_m}};
 }
 
 void MapLocalizer::TryRegion(std::size_t region,
+                             const std::optional<Pose3>& prior,
                              std::uint64_t seed,
                              const Clock& clock,
                              ImageLocalization& localization) {
@@ -72,26 +77,40 @@ void MapLocalizer::TryRegion(std::size_t region,
   }
   CameraPoseOptions options = options_;
   options.calibration = CalibrationOf(map_.regions[region].calibration);
-  const CameraPoseResult pose =
-      EstimateCameraPose(correspondences_, camera_, options, std::nullopt, seed);
+  const CameraPoseResult pose = EstimateCameraPose(correspondences_, camera_, options, prior, seed);
   localization.head_time += predicted - start;
   localization.pose_time += clock() - predicted;
-  if (localization.pose.correspondences > 0 && !IsBetterPose(pose, localization.pose)) return;
+  ++localization.regions_tried;
+  if (localization.regions_tried > 1 && !IsBetterPose(pose, localization.pose)) return;
   localization.pose = pose;
   localization.region = pose.status == CameraPoseStatus::kOk ? static_cast<int>(region) : -1;
 }
 
 Result<ImageLocalization> MapLocalizer::Localize(const GrayImage& image,
+                                                 const std::optional<CameraPrior>& prior,
                                                  std::uint64_t seed,
                                                  const Clock& clock) {
   ImageLocalization localization;
   const MonotonicTime start = clock();
   if (auto ok = predictor_->Extract(image); !ok) return std::move(ok).error();
   localization.features_time = clock() - start;
-  for (const std::size_t region : RegionsToTry())
-    TryRegion(region, seed, clock, localization);
-  last_region_.reset();
-  if (localization.region >= 0) last_region_ = static_cast<std::size_t>(localization.region);
+  const std::optional<Pose3> X_WC =
+      prior ? std::optional(AtTrainedHeight(prior->X_WC)) : std::nullopt;
+  for (const std::size_t region : selector_.Choose(prior))
+    TryRegion(region, X_WC, seed, clock, localization);
+  selector_.Report(localization.region < 0
+                       ? std::nullopt
+                       : std::optional(static_cast<std::size_t>(localization.region)));
+  return localization;
+}
+
+Result<ImageLocalization> MapLocalizer::LocalizeAnywhere(const GrayImage& image,
+                                                         std::uint64_t seed) {
+  ImageLocalization localization;
+  if (auto ok = predictor_->Extract(image); !ok) return std::move(ok).error();
+  const auto no_clock = [] { return MonotonicTime{}; };
+  for (std::size_t region = 0; region < map_.regions.size(); ++region)
+    TryRegion(region, std::nullopt, seed, no_clock, localization);
   return localization;
 }
 

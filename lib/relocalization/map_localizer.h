@@ -8,6 +8,8 @@
 
 #include "camera/pinhole_camera.h"
 #include "relocalization/image_localizer.h"
+#include "relocalization/inference_config.h"
+#include "relocalization/region_selector.h"
 #include "scene_coordinates/map_file.h"
 #include "scene_coordinates/scene_coordinate_predictor.h"
 
@@ -16,37 +18,36 @@ namespace relocd {
 /// Localises images with a map: features, the heads of the regions that are worth a try, the pose
 /// of the scene coordinates.
 ///
-/// Regions follow each other along the route. After a pose from one of them only this one and its
-/// neighbours are tried, so that the time for an image does not grow with the map; without one,
-/// all.
-///
 /// Thread-bound.
 class MapLocalizer final : public ImageLocalizer {
  public:
-  /// @param options  valid; their calibration is replaced by that of each region.
-  /// @param threads  of the network, >= 1.
-  static Result<std::unique_ptr<MapLocalizer>> Create(SceneMap map,
-                                                      const CameraPoseOptions& options,
-                                                      int threads);
+  /// @param config  valid; the calibration of its pose options is replaced by that of each region,
+  ///                and its map_path is not looked at.
+  static Result<std::unique_ptr<MapLocalizer>> Create(SceneMap map, const InferenceConfig& config);
 
-  /// Reads the map from a file. @return as ReadMap, and kInvalidInput for an empty path.
-  static Result<std::unique_ptr<MapLocalizer>> Load(const std::string& path,
-                                                    const CameraPoseOptions& options,
-                                                    int threads);
+  /// Reads the map of the config. @return as ReadMap, and kInvalidInput for an empty path.
+  static Result<std::unique_ptr<MapLocalizer>> Load(const InferenceConfig& config);
 
   [[nodiscard]] const CameraIntrinsics& camera() const override { return map_.camera; }
   [[nodiscard]] const std::string& map_id() const override { return map_.id; }
   [[nodiscard]] const SceneMap& map() const { return map_; }
 
   Result<ImageLocalization> Localize(const GrayImage& image,
+                                     const std::optional<CameraPrior>& prior,
                                      std::uint64_t seed,
                                      const Clock& clock) override;
 
- private:
-  MapLocalizer(SceneMap map, const CameraPoseOptions& options);
+  /// Tries all regions, and neither uses nor changes what is known from other images: the result
+  /// depends on the image and the seed alone.
+  Result<ImageLocalization> LocalizeAnywhere(const GrayImage& image, std::uint64_t seed);
 
-  [[nodiscard]] std::vector<std::size_t> RegionsToTry() const;
+ private:
+  MapLocalizer(SceneMap map, const InferenceConfig& config);
+
+  /// A planar prior knows no height: the nearest training pose's is taken.
+  [[nodiscard]] Pose3 AtTrainedHeight(const Pose3& X_WC) const;
   void TryRegion(std::size_t region,
+                 const std::optional<Pose3>& prior,
                  std::uint64_t seed,
                  const Clock& clock,
                  ImageLocalization& localization);
@@ -56,7 +57,7 @@ class MapLocalizer final : public ImageLocalizer {
   CameraPoseOptions options_;
   std::unique_ptr<SceneCoordinatePredictor> predictor_;
   std::vector<Correspondence> correspondences_;
-  std::optional<std::size_t> last_region_;  ///< Of the last image, if that gave a pose.
+  RegionSelector selector_;  ///< Borrows the map's regions.
 };
 
 }  // namespace relocd

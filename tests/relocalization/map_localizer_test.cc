@@ -30,7 +30,7 @@ SceneMap MakeMap() {
 }
 
 std::unique_ptr<MapLocalizer> MakeLocalizer(SceneMap map) {
-  return MapLocalizer::Create(std::move(map), {}, 1).value();
+  return MapLocalizer::Create(std::move(map), {}).value();
 }
 
 /// Time that goes on by one millisecond with each look at it.
@@ -45,7 +45,7 @@ class TickingClock {
 TEST(MapLocalizerTest, FindsTheCameraOfTheImageThatTheMapKnows) {
   const auto localizer = MakeLocalizer(MakeMap());
   const auto localization =
-      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 1), 1, TickingClock());
+      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 1), std::nullopt, 1, TickingClock());
   ASSERT_TRUE(localization) << localization.error().message;
   ASSERT_EQ(localization->pose.status, CameraPoseStatus::kOk);
   EXPECT_EQ(localization->region, 0);
@@ -58,7 +58,7 @@ TEST(MapLocalizerTest, FindsTheCameraOfTheImageThatTheMapKnows) {
 TEST(MapLocalizerTest, TimesItsStagesByTheClockThatItIsGiven) {
   const auto localizer = MakeLocalizer(MakeMap());
   const auto localization =
-      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 1), 1, TickingClock());
+      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 1), std::nullopt, 1, TickingClock());
   ASSERT_TRUE(localization);
   EXPECT_EQ(localization->features_time, FromSeconds(1e-3));
   EXPECT_EQ(localization->head_time, FromSeconds(1e-3));
@@ -68,7 +68,7 @@ TEST(MapLocalizerTest, TimesItsStagesByTheClockThatItIsGiven) {
 TEST(MapLocalizerTest, FindsNothingInAnotherImage) {
   const auto localizer = MakeLocalizer(MakeMap());
   const auto localization =
-      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 2), 1, TickingClock());
+      localizer->Localize(MakeTexturedImage(kWidth, kHeight, 2), std::nullopt, 1, TickingClock());
   ASSERT_TRUE(localization);
   EXPECT_NE(localization->pose.status, CameraPoseStatus::kOk);
   EXPECT_EQ(localization->region, -1);
@@ -76,7 +76,8 @@ TEST(MapLocalizerTest, FindsNothingInAnotherImage) {
 
 TEST(MapLocalizerTest, RefusesAnImageOfAnotherSize) {
   const auto localizer = MakeLocalizer(MakeMap());
-  const auto localization = localizer->Localize(MakeTexturedImage(64, 48, 1), 1, TickingClock());
+  const auto localization =
+      localizer->Localize(MakeTexturedImage(64, 48, 1), std::nullopt, 1, TickingClock());
   ASSERT_FALSE(localization);
   EXPECT_EQ(localization.error().kind, ErrorKind::kInvalidInput);
 }
@@ -90,19 +91,40 @@ TEST(MapLocalizerTest, TakesThePoseOfTheRegionThatExplainsTheImage) {
   map.regions = {empty, empty, empty, knowing, empty};
   const auto localizer = MakeLocalizer(std::move(map));
   const GrayImage image = MakeTexturedImage(kWidth, kHeight, 1);
-  const auto first = localizer->Localize(image, 1, TickingClock());
-  ASSERT_TRUE(first);
+  const auto lost = localizer->Localize(image, std::nullopt, 1, TickingClock());
+  ASSERT_TRUE(lost);
+  EXPECT_EQ(lost->region, -1);
+  EXPECT_EQ(lost->regions_tried, 3) << "the others come next";
+  const auto first = localizer->Localize(image, std::nullopt, 1, TickingClock());
   EXPECT_EQ(first->region, 3);
-  EXPECT_EQ(first->head_time, FromSeconds(5e-3)) << "all five are tried";
+  EXPECT_EQ(first->regions_tried, 3);
+  EXPECT_EQ(first->head_time, FromSeconds(3e-3));
 
-  const auto second = localizer->Localize(image, 1, TickingClock());
-  EXPECT_EQ(second->region, 3);
-  EXPECT_EQ(second->head_time, FromSeconds(3e-3)) << "the one and its neighbours are tried";
-  EXPECT_EQ(second->pose.X_WC.translation(), first->pose.X_WC.translation());
+  const auto anywhere = localizer->LocalizeAnywhere(image, 1);
+  ASSERT_TRUE(anywhere);
+  EXPECT_EQ(anywhere->region, 3);
+  EXPECT_EQ(anywhere->regions_tried, 5);
+  EXPECT_EQ(anywhere->pose.X_WC.translation(), first->pose.X_WC.translation());
+}
 
-  ASSERT_TRUE(localizer->Localize(MakeTexturedImage(kWidth, kHeight, 2), 1, TickingClock()));
-  EXPECT_EQ(localizer->Localize(image, 1, TickingClock())->head_time, FromSeconds(5e-3))
-      << "all are tried again after a loss";
+TEST(MapLocalizerTest, LooksWhereTheCameraIsExpected) {
+  SceneMap map = MakeMap();
+  const MapRegion knowing = map.regions.front();
+  MapRegion empty;
+  empty.head = MakeRandomHead(knowing.head.shape, 1);
+  map.regions.assign(50, empty);
+  map.regions[41] = knowing;
+  map.regions[41].training_poses = {{kPose.translation().cast<float>(), 0.0F}};
+  const auto localizer = MakeLocalizer(std::move(map));
+  // Some way off, and without the height, which the map knows.
+  const Eigen::Vector3d near(kPose.translation().x() - 2.0, kPose.translation().y() + 1.0, -30.0);
+  const CameraPrior prior{.X_WC = Pose3(kPose.rotation(), near), .sigma_m = 2.0, .sigma_rad = 0.1};
+  const GrayImage image = MakeTexturedImage(kWidth, kHeight, 1);
+  const auto localization = localizer->Localize(image, prior, 1, TickingClock());
+  ASSERT_TRUE(localization);
+  EXPECT_EQ(localization->region, 41);
+  EXPECT_LT((localization->pose.X_WC.translation() - kPose.translation()).norm(), 0.1);
+  EXPECT_EQ(localizer->Localize(image, prior, 2, TickingClock())->regions_tried, 1);
 }
 
 TEST(MapLocalizerTest, AppliesTheCalibrationOfTheRegion) {
@@ -110,17 +132,19 @@ TEST(MapLocalizerTest, AppliesTheCalibrationOfTheRegion) {
   map.regions.front().calibration.confidence_threshold = 1.0;
   const auto localization =
       MakeLocalizer(std::move(map))
-          ->Localize(MakeTexturedImage(kWidth, kHeight, 1), 1, TickingClock());
+          ->Localize(MakeTexturedImage(kWidth, kHeight, 1), std::nullopt, 1, TickingClock());
   ASSERT_TRUE(localization);
   EXPECT_EQ(localization->pose.status, CameraPoseStatus::kLowConfidence);
 }
 
 TEST(MapLocalizerTest, SaysWhichMapIsMissing) {
-  const auto none = MapLocalizer::Load("", {}, 1);
+  const auto none = MapLocalizer::Load({});
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().kind, ErrorKind::kInvalidInput);
   EXPECT_THAT(none.error().message, HasSubstr("map_path is empty, must name a map"));
-  const auto missing = MapLocalizer::Load("/nonexistent/site.relocmap", {}, 1);
+  InferenceConfig config;
+  config.map_path = "/nonexistent/site.relocmap";
+  const auto missing = MapLocalizer::Load(config);
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().kind, ErrorKind::kInvalidInput);
   EXPECT_THAT(missing.error().message, HasSubstr("/nonexistent/site.relocmap"));

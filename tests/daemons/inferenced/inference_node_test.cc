@@ -1,6 +1,10 @@
 #include "inferenced/inference_node.h"
 
 #include <chrono>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,22 +34,28 @@ CameraIntrinsics SmallCamera() {
 
 const Pose3 kPose(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d(12.0, -7.0, 1.6));
 
+/// 1.2 m ahead of the body's origin and 1.5 m above it, looking ahead.
+const Pose3 kMounting(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5), Eigen::Vector3d(1.2, 0.0, 1.5));
+
 /// Says what the test tells it to say.
 class FakeLocalizer final : public ImageLocalizer {
  public:
   [[nodiscard]] const CameraIntrinsics& camera() const override { return camera_; }
   [[nodiscard]] const std::string& map_id() const override { return map_id_; }
   Result<ImageLocalization> Localize(const GrayImage& image,
+                                     const std::optional<CameraPrior>& prior,
                                      std::uint64_t seed,
                                      const Clock& /*clock*/) override {
     EXPECT_EQ(image.width, kWidth);
     EXPECT_EQ(image.height, kHeight);
     seeds.push_back(seed);
+    priors.push_back(prior);
     return answer;
   }
 
   ImageLocalization answer;
   std::vector<std::uint64_t> seeds;
+  std::vector<std::optional<CameraPrior>> priors;
 
  private:
   CameraIntrinsics camera_ = SmallCamera();
@@ -89,8 +99,12 @@ class InferenceNodeTest : public testing::Test {
     auto localizer = std::make_unique<FakeLocalizer>();
     localizer_ = localizer.get();
     localizer_->answer = GoodAnswer();
-    node_ = std::make_unique<InferenceNode>(
-        InferenceConfig{}, std::move(localizer), bus_, kRunId, [this] { return now_; });
+    node_ = std::make_unique<InferenceNode>(InferenceConfig{},
+                                            std::move(localizer),
+                                            std::map<std::string, Pose3>{{"front", kMounting}},
+                                            bus_,
+                                            kRunId,
+                                            [this] { return now_; });
     bus_.Subscribe<camera_pose_t>(
         channels::kCameraPose, Delivery::kEvery, [this](const camera_pose_t& answer) {
           answers_.push_back(answer);
@@ -253,7 +267,7 @@ TEST(InferenceNodeAgeTest, TakesImagesOfAnyAgeWithoutALimit) {
   InProcessBus bus;
   InferenceConfig config;
   config.max_image_age_ms = 0;
-  InferenceNode node(config, std::make_unique<FakeLocalizer>(), bus, kRunId, [] {
+  InferenceNode node(config, std::make_unique<FakeLocalizer>(), {}, bus, kRunId, [] {
     return ClockReading{.monotonic = FromNanoseconds(kImageTimeNs) + std::chrono::hours(24 * 365),
                         .realtime_us = 0};
   });
@@ -308,7 +322,8 @@ std::vector<std::uint8_t> BytesOfAnAnswer() {
   InProcessBus bus;
   InferenceNode node(
       {},
-      MapLocalizer::Create(MakeOneImageMap(decoded, SmallCamera(), kPose), {}, 1).value(),
+      MapLocalizer::Create(MakeOneImageMap(decoded, SmallCamera(), kPose), {}).value(),
+      std::map<std::string, Pose3>{},
       bus,
       kRunId,
       [] { return ClockReading{.monotonic = FromNanoseconds(kImageTimeNs), .realtime_us = 0}; });
@@ -342,6 +357,50 @@ TEST(InferenceChainTest, LocalisesAnImageMessageWithARealMap) {
 
 TEST(InferenceChainTest, GivesTheSameBytesTwice) {
   EXPECT_EQ(BytesOfAnAnswer(), BytesOfAnAnswer());
+}
+
+localization_t LocalizationAt(std::int64_t mono_ns) {
+  localization_t localization{};
+  localization.status = localization_t::OK;
+  localization.mono_ns = mono_ns;
+  localization.x_WB_m = 10.0;
+  localization.y_WB_m = 20.0;
+  localization.yaw_WB_rad = 0.5;
+  localization.speed_mps = 8.0;
+  Eigen::Map<Eigen::Matrix3d>(localization.covariance).diagonal() << 0.09, 0.16, 0.0004;
+  return localization;
+}
+
+TEST_F(InferenceNodeTest, LooksFirstWhereTheLocalizationExpectsTheCamera) {
+  Ask(GoodImage(1));
+  node_->Handle(LocalizationAt(kImageTimeNs - 100'000'000));
+  Ask(GoodImage(2));
+  ASSERT_EQ(localizer_->priors.size(), 2U);
+  EXPECT_FALSE(localizer_->priors[0]);
+  ASSERT_TRUE(localizer_->priors[1]);
+  const CameraPrior& prior = *localizer_->priors[1];
+  // 0.8 m of travel since then, and 1.2 m to the camera.
+  const Eigen::Vector3d expected(10.0 + 2.0 * std::cos(0.5), 20.0 + 2.0 * std::sin(0.5), 1.5);
+  EXPECT_LT((prior.X_WC.translation() - expected).norm(), 1e-9);
+  EXPECT_NEAR(prior.X_WC.R().col(2).y(), std::sin(0.5), 1e-9) << "it looks ahead";
+  EXPECT_NEAR(prior.sigma_m, 0.5, 1e-12);
+  EXPECT_NEAR(prior.sigma_rad, 0.02, 1e-12);
+  EXPECT_EQ(node_->counters().priors, 1);
+}
+
+TEST_F(InferenceNodeTest, ExpectsNothingWhereTheLocalizationSaysNothingOfTheImagesTime) {
+  std::vector<localization_t> useless(5, LocalizationAt(kImageTimeNs));
+  useless[0].mono_ns = kImageTimeNs - 2'100'000'000;
+  useless[1].mono_ns = kImageTimeNs + 2'100'000'000;
+  useless[2].status = localization_t::LOST;
+  useless[3].status = localization_t::UNINITIALISED;
+  useless[4].x_WB_m = std::numeric_limits<double>::quiet_NaN();
+  for (const localization_t& localization : useless) {
+    node_->Handle(LocalizationAt(kImageTimeNs));
+    node_->Handle(localization);
+    Ask(GoodImage());
+    EXPECT_FALSE(localizer_->priors.back());
+  }
 }
 
 }  // namespace
