@@ -25,10 +25,11 @@ struct Verb {
 };
 
 /// What is beside this program and not in here is listed too, without a help text.
-constexpr std::array<Verb, 11> kVerbs{{
+constexpr std::array<Verb, 12> kVerbs{{
     {"status", "how the daemons are, and where the robot is"},
     {"check-config", "whether a robot's config is right"},
     {"map", "train a map from a drive, localize images in it, say what is in it"},
+    {"can", "the signals of a recorded CAN bus, as the DBC file has them"},
     {"odometry", "odometry from a CAN log, as odometryd makes it"},
     {"smooth", "fuse odometry and fixes from files, as smootherd does"},
     {"replay", "a recorded log through the daemons' code, exactly"},

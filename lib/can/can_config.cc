@@ -41,6 +41,11 @@ Result<void> CanConfig::Validate() const {
     return Invalid(
         fmt::format("playback_start_s is {}, must be finite and at least 0", playback_start_s));
   }
+  for (const auto& [name, rule] : messages) {
+    if (auto ok = rule.Validate(); !ok) {
+      return Invalid(fmt::format("messages.{}.{}", name, ok.error().message));
+    }
+  }
   return {};
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <map>
 #include <string>
 
+#include "can/message_guard.h"
 #include "core/result.h"
 
 namespace relocd {
@@ -15,6 +17,7 @@ struct CanConfig {
   bool fd_frames = false;
   double playback_start_s = 0.0;
   std::string dbc_file{};
+  std::map<std::string, MessageRule> messages{};
 
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
@@ -34,6 +37,11 @@ struct CanConfig {
           self.playback_start_s,
           ">= 0; candump: the recorded time at which playback begins");
     visit("dbc_file", self.dbc_file, "the signals of the vehicle, in DBC format");
+    visit(
+        "messages",
+        self.messages,
+        "by the name of a message in the DBC file: how it shows that it is new and whole (counter, "
+        "counter_step, counter_modulo, checksum, checksum_rule, data_id, max_age_s)");
   }
 
   /// @return kInvalidInput, naming the field, its value and what is allowed.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -23,6 +24,9 @@ namespace {
 
 /// Holds signals that belong to no message, and is no frame on the bus.
 constexpr std::string_view kOrphanMessage = "VECTOR__INDEPENDENT_SIG_MSG";
+/// Bytes of the longest message of J1939.
+constexpr int kMaxMessageSize = 1785;
+constexpr std::uint64_t kMaxId = std::numeric_limits<std::uint32_t>::max();
 
 Error Malformed(std::string message) {
   return {ErrorKind::kInvalidInput, std::move(message)};
@@ -67,17 +71,55 @@ class LineParser {
     return static_cast<std::uint64_t>(*value);
   }
 
-  /// The text between double quotes.
+  /// A raw value of up to 64 bits, signed or not, as its two's complement.
+  std::uint64_t RawValue(const char* what) {
+    const std::string_view word = TakeNumber();
+    if (const auto value = ParseInt64(word)) return static_cast<std::uint64_t>(*value);
+    std::uint64_t large = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), large);
+    if (word.empty() || error != std::errc() || end != word.data() + word.size()) {
+      Fail(what, word, "an integer of at most 64 bits");
+    }
+    return large;
+  }
+
+  /// A value of up to 64 bits without a sign, such as an end of `1-5`.
+  std::uint64_t Digits(const char* what) {
+    const std::string_view word =
+        TakeWhile([](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; });
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (word.empty() || error != std::errc()) {
+      Fail(what, word, "an integer of at most 64 bits without a sign");
+    }
+    return value;
+  }
+
+  /// The text between double quotes, in which \" is a quote.
   std::string Quoted(const char* what) {
     SkipBlanks();
-    const auto end = rest_.starts_with('"') ? rest_.find('"', 1) : std::string_view::npos;
-    if (end == std::string_view::npos) {
-      Fail(what, rest_.substr(0, 1), "text in double quotes on one line");
-      return {};
+    std::string text;
+    bool escaped = false;
+    for (std::size_t i = 1; rest_.starts_with('"') && i < rest_.size(); ++i) {
+      const char c = rest_[i];
+      if (c == '"' && !escaped) {
+        rest_.remove_prefix(i + 1);
+        return text;
+      }
+      if (c == '"') text.pop_back();
+      escaped = c == '\\' && !escaped;
+      text += c;
     }
-    std::string text(rest_.substr(1, end - 1));
-    rest_.remove_prefix(end + 1);
-    return text;
+    Fail(what, rest_.substr(0, 1), "text in double quotes on one line");
+    return {};
+  }
+
+  /// The next word, which may be anything.
+  std::string_view Word() { return TakeWhile(IsNameCharacter); }
+
+  [[nodiscard]] bool AtEnd() {
+    SkipBlanks();
+    return rest_.empty() || rest_.front() == ';';
   }
 
   /// Takes `c` if it is next.
@@ -98,7 +140,9 @@ class LineParser {
   }
 
  private:
-  void SkipBlanks() { rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size())); }
+  void SkipBlanks() {
+    rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t\n"), rest_.size()));
+  }
 
   template <typename Predicate>
   std::string_view TakeWhile(Predicate belongs) {
@@ -123,19 +167,22 @@ class LineParser {
   std::string error_;
 };
 
+/// An identifier as the file has it: extended ones with bit 31 set.
+CanId IdOf(std::uint64_t number) {
+  const auto id = static_cast<std::uint32_t>(number);
+  return {.value = id & ~kCanExtendedFlag, .extended = (id & kCanExtendedFlag) != 0};
+}
+
 /// `BO_ 170 WHEEL_SPEEDS: 8 XXX`, behind the keyword.
 Result<DbcMessage> ParseMessage(LineParser parser) {
-  constexpr std::uint32_t kExtendedBit = kCanExtendedFlag;
-  const auto id = static_cast<std::uint32_t>(
-      parser.Integer("message identifier", std::numeric_limits<std::uint32_t>::max()));
+  const auto id = static_cast<std::uint32_t>(parser.Integer("message identifier", kMaxId));
   DbcMessage message;
   message.name = parser.Name("message name");
   parser.Expect(':', "what follows the message name");
-  message.size = static_cast<int>(parser.Integer("message size", CanFrame::kMaxSize));
+  message.size = static_cast<int>(parser.Integer("message size", kMaxMessageSize));
   if (auto ok = parser.status(); !ok) return std::move(ok).error();
 
-  message.id.extended = (id & kExtendedBit) != 0;
-  message.id.value = id & ~kExtendedBit;
+  message.id = IdOf(id);
   const std::uint32_t maximum = message.id.extended ? kCanExtendedMask : kCanStandardMask;
   if (message.id.value > maximum && message.name != kOrphanMessage) {
     return Malformed(fmt::format(
@@ -159,7 +206,8 @@ Result<void> ParseMultiplexing(std::string_view text, DbcSignal& signal) {
     return Malformed(fmt::format(
         "multiplexing of signal {} is '{}', must be M or m and a number", signal.name, text));
   }
-  signal.mux_value = static_cast<std::uint64_t>(*value);
+  const auto selected = static_cast<std::uint64_t>(*value);
+  signal.mux_ranges = {{.first = selected, .last = selected}};
   return {};
 }
 
@@ -173,7 +221,7 @@ Result<DbcSignal> ParseSignal(LineParser parser) {
     if (auto ok = parser.status(); !ok) return std::move(ok).error();
     if (auto ok = ParseMultiplexing(multiplexing, signal); !ok) return std::move(ok).error();
   }
-  signal.start_bit = static_cast<int>(parser.Integer("start bit", CanFrame::kMaxSize * 8 - 1));
+  signal.start_bit = static_cast<int>(parser.Integer("start bit", kMaxMessageSize * 8 - 1));
   parser.Expect('|', "what follows the start bit");
   signal.length = static_cast<int>(parser.Integer("length in bits", 64));
   parser.Expect('@', "what follows the length");
@@ -217,7 +265,38 @@ Result<void> CheckFits(const DbcSignal& signal, const DbcMessage& message) {
   return {};
 }
 
-/// Reads a file line by line.
+/// Puts the multiplexor's name into each signal that has one, unless SG_MUL_VAL_ did.
+void NameMultiplexors(DbcMessage& message) {
+  const auto is_root = [](const DbcSignal& signal) {
+    return signal.is_multiplexor && signal.mux_ranges.empty();
+  };
+  const auto multiplexors = std::count_if(message.signals.begin(),
+                                          message.signals.end(),
+                                          [](const DbcSignal& s) { return s.is_multiplexor; });
+  const auto root = std::find_if(message.signals.begin(), message.signals.end(), is_root);
+  // With several of them the number behind the m does not say of which it is a value.
+  if (multiplexors != 1 || root == message.signals.end()) return;
+  for (DbcSignal& signal : message.signals) {
+    if (!signal.mux_ranges.empty() && signal.multiplexor.empty()) signal.multiplexor = root->name;
+  }
+}
+
+/// Follows each signal's multiplexors up to one that is always there.
+Result<void> CheckMultiplexing(const DbcMessage& message) {
+  for (const DbcSignal& signal : message.signals) {
+    const DbcSignal* above = &signal;
+    for (std::size_t steps = 0; above != nullptr && !above->multiplexor.empty(); ++steps) {
+      if (steps > message.signals.size()) {
+        return Malformed(fmt::format(
+            "signal {}.{}: its multiplexors go round in a circle", message.name, signal.name));
+      }
+      above = message.FindSignal(above->multiplexor);
+    }
+  }
+  return {};
+}
+
+/// Reads a file line by line, and sections that end with a `;` whole.
 class DbcParser {
  public:
   Result<void> ParseLine(std::string_view line);
@@ -226,48 +305,45 @@ class DbcParser {
  private:
   Result<void> AddMessage(std::string_view rest);
   Result<void> AddSignal(std::string_view rest);
-  Result<void> SetRawType(std::string_view rest);
-  /// Passes over text until the `;` that ends a section.
-  void SkipUntilSemicolon(std::string_view text);
+  /// Takes a line of a section, and reads it when its `;` is there.
+  Result<void> ContinueSection(std::string_view line);
+  Result<void> ReadSection();
+  Result<void> SetRawType(LineParser parser);
+  Result<void> SetMultiplexing(LineParser parser);
+  Result<void> SetValueNames(LineParser parser);
+  Result<void> AddValueTable(LineParser parser);
+  Result<void> SetComment(LineParser parser);
+  Result<void> SetAttribute(LineParser parser);
+
+  /// nullptr when there is none.
+  DbcMessage* Find(CanId id);
+  DbcSignal* Find(CanId id, std::string_view signal_name);
 
   std::vector<DbcMessage> messages_;
-  std::set<CanId> ids_;
+  std::map<CanId, std::size_t> indices_;  ///< Into messages_.
   std::set<std::string> names_;
+  std::map<std::string, std::map<std::int64_t, std::string>> value_tables_;
   bool in_new_symbols_ = false;  ///< Within NS_, which lists keywords, one a line.
-  bool skipping_ = false;        ///< Within a section that ends with `;`.
-  bool in_quotes_ = false;       ///< Within a text of such a section.
+  std::string keyword_;          ///< Of the section that is being read; empty outside of one.
+  std::string section_;          ///< What it said so far.
+  bool in_quotes_ = false;       ///< Within a text of it.
+  bool escaped_ = false;         ///< Behind a backslash within a text.
 };
 
 /// Sections that may go over lines, until a `;` outside of quotes.
 bool EndsWithSemicolon(std::string_view keyword) {
-  constexpr std::array<std::string_view, 20> kKeywords = {"BA_",
-                                                          "BA_DEF_",
-                                                          "BA_DEF_DEF_",
-                                                          "BA_DEF_DEF_REL_",
-                                                          "BA_DEF_REL_",
-                                                          "BA_REL_",
-                                                          "BA_DEF_SGTYPE_",
-                                                          "BA_SGTYPE_",
-                                                          "BO_TX_BU_",
-                                                          "CAT_",
-                                                          "CAT_DEF_",
-                                                          "CM_",
-                                                          "EV_",
-                                                          "ENVVAR_DATA_",
-                                                          "SGTYPE_",
-                                                          "SIG_GROUP_",
-                                                          "SIG_MUL_VAL_",
-                                                          "SIGTYPE_VALTYPE_",
-                                                          "VAL_",
-                                                          "VAL_TABLE_"};
+  constexpr std::array<std::string_view, 21> kKeywords = {
+      "BA_",         "BA_DEF_",       "BA_DEF_DEF_",      "BA_DEF_DEF_REL_",
+      "BA_DEF_REL_", "BA_REL_",       "BA_DEF_SGTYPE_",   "BA_SGTYPE_",
+      "BO_TX_BU_",   "CAT_",          "CAT_DEF_",         "CM_",
+      "EV_",         "ENVVAR_DATA_",  "SGTYPE_",          "SIG_GROUP_",
+      "SG_MUL_VAL_", "SIG_TYPE_REF_", "SIGTYPE_VALTYPE_", "VAL_",
+      "VAL_TABLE_"};
   return std::find(kKeywords.begin(), kKeywords.end(), keyword) != kKeywords.end();
 }
 
 Result<void> DbcParser::ParseLine(std::string_view line) {
-  if (skipping_) {
-    SkipUntilSemicolon(line);
-    return {};
-  }
+  if (!keyword_.empty()) return ContinueSection(line);
   line = Trim(line);
   if (line.empty() || line.starts_with("//")) return {};
   const std::string_view keyword =
@@ -279,32 +355,63 @@ Result<void> DbcParser::ParseLine(std::string_view line) {
   in_new_symbols_ = keyword == "NS_";
   if (keyword == "BO_") return AddMessage(rest);
   if (keyword == "SG_") return AddSignal(rest);
-  if (keyword == "SIG_VALTYPE_") return SetRawType(rest);
+  if (keyword == "SIG_VALTYPE_") return SetRawType(LineParser(rest));
   if (EndsWithSemicolon(keyword)) {
-    skipping_ = true;
-    SkipUntilSemicolon(rest);
-    return {};
+    keyword_ = keyword;
+    return ContinueSection(rest);
   }
   if (IsName(keyword)) return {};  // VERSION, NS_, BS_, BU_ and what later versions may bring
   return Malformed(fmt::format("'{}', must begin with a keyword such as BO_ or SG_",
                                line.substr(0, std::min<std::size_t>(line.size(), 20))));
 }
 
-void DbcParser::SkipUntilSemicolon(std::string_view text) {
-  bool escaped = false;  // some tools write \" within a text
-  for (const char c : text) {
-    if (c == '"' && !escaped) in_quotes_ = !in_quotes_;
-    escaped = in_quotes_ && c == '\\' && !escaped;
-    if (c != ';' || in_quotes_) continue;
-    skipping_ = false;  // what follows on the line is passed over, too
-    return;
+Result<void> DbcParser::ContinueSection(std::string_view line) {
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  for (const char c : line) {
+    if (c == '"' && !escaped_) in_quotes_ = !in_quotes_;
+    escaped_ = in_quotes_ && c == '\\' && !escaped_;  // some tools write \" within a text
+    if (c != ';' || in_quotes_) {
+      section_ += c;
+      continue;
+    }
+    auto ok = ReadSection();  // what follows on the line is passed over
+    keyword_.clear();
+    section_.clear();
+    return ok;
   }
+  section_ += '\n';
+  escaped_ = false;
+  return {};
+}
+
+Result<void> DbcParser::ReadSection() {
+  const LineParser parser(section_);
+  if (keyword_ == "SG_MUL_VAL_") return SetMultiplexing(parser);
+  if (keyword_ == "VAL_") return SetValueNames(parser);
+  if (keyword_ == "VAL_TABLE_") return AddValueTable(parser);
+  if (keyword_ == "CM_") return SetComment(parser);
+  if (keyword_ == "BA_") return SetAttribute(parser);
+  return {};
+}
+
+DbcMessage* DbcParser::Find(CanId id) {
+  const auto found = indices_.find(id);
+  return found == indices_.end() ? nullptr : &messages_[found->second];
+}
+
+DbcSignal* DbcParser::Find(CanId id, std::string_view signal_name) {
+  DbcMessage* const message = Find(id);
+  if (message == nullptr) return nullptr;
+  const auto signal = std::find_if(message->signals.begin(),
+                                   message->signals.end(),
+                                   [&](const DbcSignal& s) { return s.name == signal_name; });
+  return signal == message->signals.end() ? nullptr : &*signal;
 }
 
 Result<void> DbcParser::AddMessage(std::string_view rest) {
   auto message = ParseMessage(LineParser(rest));
   if (!message) return std::move(message).error();
-  if (!ids_.insert(message->id).second) {
+  if (!indices_.emplace(message->id, messages_.size()).second) {
     return Malformed(fmt::format("message {}: another has the identifier {}, must be unique",
                                  message->name,
                                  message->id.value));
@@ -328,26 +435,18 @@ Result<void> DbcParser::AddSignal(std::string_view rest) {
 }
 
 /// ` 170 RL : 1;`, behind the keyword: the raw value is a float (1) or a double (2).
-Result<void> DbcParser::SetRawType(std::string_view rest) {
-  LineParser parser(rest);
-  const auto id = static_cast<std::uint32_t>(
-      parser.Integer("message identifier", std::numeric_limits<std::uint32_t>::max()));
+Result<void> DbcParser::SetRawType(LineParser parser) {
+  const CanId id = IdOf(parser.Integer("message identifier", kMaxId));
   const std::string name = parser.Name("signal name");
   parser.Take(':');
-  const auto type = parser.Integer("type of the raw value", 2);
+  const auto type = parser.Integer("type of the raw value", 3);
   if (auto ok = parser.status(); !ok) return ok;
-  const CanId can_id{.value = id & ~kCanExtendedFlag, .extended = (id & kCanExtendedFlag) != 0};
-  const auto message = std::find_if(
-      messages_.begin(), messages_.end(), [&](const DbcMessage& m) { return m.id == can_id; });
-  if (message == messages_.end() || type == 0) return {};
-  const auto signal = std::find_if(message->signals.begin(),
-                                   message->signals.end(),
-                                   [&](const DbcSignal& s) { return s.name == name; });
-  if (signal == message->signals.end()) return {};
+  DbcSignal* const signal = Find(id, name);
+  if (signal == nullptr || type == 0 || type == 3) return {};
   const int length = type == 1 ? 32 : 64;
   if (signal->length != length) {
     return Malformed(fmt::format("floating-point signal {}.{} has {} bits, must have {}",
-                                 message->name,
+                                 Find(id)->name,
                                  name,
                                  signal->length,
                                  length));
@@ -356,9 +455,114 @@ Result<void> DbcParser::SetRawType(std::string_view rest) {
   return {};
 }
 
+/// ` 170 SIGNAL MULTIPLEXOR 1-1, 5-10`, behind the keyword.
+Result<void> DbcParser::SetMultiplexing(LineParser parser) {
+  const CanId id = IdOf(parser.Integer("message identifier", kMaxId));
+  const std::string name = parser.Name("signal name");
+  const std::string multiplexor = parser.Name("name of the multiplexor");
+  std::vector<MuxRange> ranges;
+  do {
+    MuxRange range;
+    range.first = parser.Digits("first value of a range");
+    parser.Expect('-', "what follows the first value of a range");
+    range.last = parser.Digits("last value of a range");
+    if (auto ok = parser.status(); !ok) return ok;
+    if (range.first > range.last) {
+      return Malformed(fmt::format(
+          "range of signal {} is {}-{}, must not go backwards", name, range.first, range.last));
+    }
+    ranges.push_back(range);
+  } while (parser.Take(',') || !parser.AtEnd());
+  DbcMessage* const message = Find(id);
+  DbcSignal* const signal = Find(id, name);
+  if (signal == nullptr) return {};
+  const DbcSignal* const above = message->FindSignal(multiplexor);
+  if (above == nullptr || !above->is_multiplexor) {
+    return Malformed(fmt::format("multiplexor of signal {}.{} is {}, must be a signal with M there",
+                                 message->name,
+                                 name,
+                                 multiplexor));
+  }
+  signal->multiplexor = multiplexor;
+  signal->mux_ranges = std::move(ranges);
+  return {};
+}
+
+/// `0 "standing" 1 "moving"`.
+std::map<std::int64_t, std::string> ParseValueNames(LineParser& parser) {
+  std::map<std::int64_t, std::string> names;
+  while (!parser.AtEnd() && parser.status()) {
+    const std::uint64_t value = parser.RawValue("value that is named");
+    names[static_cast<std::int64_t>(value)] = parser.Quoted("name of a value");
+  }
+  return names;
+}
+
+/// ` 170 FR 0 "standing" 1 "moving" `, or ` 170 FR TABLE`, behind the keyword.
+Result<void> DbcParser::SetValueNames(LineParser parser) {
+  LineParser ahead = parser;
+  if (IsName(ahead.Word())) return {};  // of an environment variable
+  const CanId id = IdOf(parser.Integer("message identifier", kMaxId));
+  const std::string name = parser.Name("signal name");
+  if (auto ok = parser.status(); !ok) return ok;
+  ahead = parser;
+  const std::string table(ahead.Word());
+  const auto known = value_tables_.find(table);
+  auto names = known != value_tables_.end() ? known->second
+               : IsName(table)              ? std::map<std::int64_t, std::string>()
+                                            : ParseValueNames(parser);
+  if (auto ok = parser.status(); !ok) return ok;
+  if (DbcSignal* const signal = Find(id, name)) signal->value_names = std::move(names);
+  return {};
+}
+
+/// ` TABLE 0 "standing" 1 "moving" `, behind the keyword.
+Result<void> DbcParser::AddValueTable(LineParser parser) {
+  const std::string name = parser.Name("name of the value table");
+  auto names = ParseValueNames(parser);
+  if (auto ok = parser.status(); !ok) return ok;
+  value_tables_[name] = std::move(names);
+  return {};
+}
+
+/// ` SG_ 170 FR "text"`, ` BO_ 170 "text"` or of what we have no place for, behind the keyword.
+Result<void> DbcParser::SetComment(LineParser parser) {
+  const std::string kind(parser.Word());
+  if (kind != "SG_" && kind != "BO_") return {};
+  const CanId id = IdOf(parser.Integer("message identifier", kMaxId));
+  const std::string name = kind == "SG_" ? parser.Name("signal name") : "";
+  std::string comment = parser.Quoted("comment");
+  if (auto ok = parser.status(); !ok) return ok;
+  DbcMessage* const message = Find(id);
+  DbcSignal* const signal = Find(id, name);
+  if (signal != nullptr) {
+    signal->comment = std::move(comment);
+  } else if (message != nullptr && name.empty()) {
+    message->comment = std::move(comment);
+  }
+  return {};
+}
+
+/// ` "GenMsgCycleTime" BO_ 170 12`, in ms, behind the keyword.
+Result<void> DbcParser::SetAttribute(LineParser parser) {
+  const std::string name = parser.Quoted("name of the attribute");
+  if (auto ok = parser.status(); !ok) return ok;
+  if (name != "GenMsgCycleTime" || parser.Word() != "BO_") return {};
+  const CanId id = IdOf(parser.Integer("message identifier", kMaxId));
+  const double cycle_time_ms = parser.Number("cycle time");
+  if (auto ok = parser.status(); !ok) return ok;
+  DbcMessage* const message = Find(id);
+  if (message != nullptr && cycle_time_ms > 0.0) message->cycle_time_s = 1e-3 * cycle_time_ms;
+  return {};
+}
+
 Result<std::vector<DbcMessage>> DbcParser::Finish() && {
-  if (skipping_) return Malformed("the file ends within a section, must end it with ';'");
+  if (!keyword_.empty()) return Malformed("the file ends within a section, must end it with ';'");
   if (messages_.empty()) return Malformed("has no message (BO_), must have at least one");
+  for (DbcMessage& message : messages_) {
+    NameMultiplexors(message);
+    if (auto ok = CheckMultiplexing(message); !ok) return std::move(ok).error();
+  }
   return std::move(messages_);
 }
 
@@ -371,13 +575,6 @@ const DbcSignal* DbcMessage::FindSignal(std::string_view signal_name) const {
   return found == signals.end() ? nullptr : &*found;
 }
 
-const DbcSignal* DbcMessage::multiplexor() const {
-  const auto found = std::find_if(signals.begin(), signals.end(), [](const DbcSignal& signal) {
-    return signal.is_multiplexor;
-  });
-  return found == signals.end() ? nullptr : &*found;
-}
-
 Result<DbcFile> DbcFile::Read(const std::string& path) {
   auto text = ReadFile(path);
   if (!text) return std::move(text).error();
@@ -385,6 +582,8 @@ Result<DbcFile> DbcFile::Read(const std::string& path) {
 }
 
 Result<DbcFile> DbcFile::Parse(std::string_view text, const std::string& path) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   DbcParser parser;
   for (std::size_t line_number = 1; !text.empty(); ++line_number) {
     const auto end = text.find('\n');
@@ -416,12 +615,43 @@ Result<DbcFile::SignalReference> DbcFile::FindSignal(std::string_view full_name)
                                  full_name,
                                  fmt::join(NearestNames(full_name, SignalNames(), 3), ", ")));
   }
-  const DbcSignal* multiplexor = message->multiplexor();
-  if (signal->mux_value && multiplexor != nullptr && multiplexor->mux_value) {
+  if (message->size > static_cast<int>(CanFrame::kMaxSize)) {
+    return Malformed(
+        fmt::format("{}: signal '{}' is in a message of {} bytes, must be in one of up "
+                    "to {}, which a frame can hold",
+                    path_,
+                    full_name,
+                    message->size,
+                    CanFrame::kMaxSize));
+  }
+  for (const DbcSignal* above = signal; !above->mux_ranges.empty();
+       above = message->FindSignal(above->multiplexor)) {
+    if (!above->multiplexor.empty()) continue;
     return Malformed(fmt::format(
-        "{}: signal '{}' is multiplexed twice, must be at most once", path_, full_name));
+        "{}: signal '{}' depends on several multiplexors, or none: SG_MUL_VAL_ must say "
+        "on which",
+        path_,
+        full_name));
   }
   return SignalReference{.message = &*message, .signal = signal};
+}
+
+const DbcMessage* DbcFile::FindMessage(CanId id) const {
+  const auto found = std::find_if(
+      messages_.begin(), messages_.end(), [&](const DbcMessage& m) { return m.id == id; });
+  return found == messages_.end() ? nullptr : &*found;
+}
+
+Result<const DbcMessage*> DbcFile::FindMessage(std::string_view name) const {
+  std::vector<std::string> names;
+  for (const DbcMessage& message : messages_) {
+    if (message.name == name) return &message;
+    names.push_back(message.name);
+  }
+  return Malformed(fmt::format("{}: has no message '{}', nearest are {}",
+                               path_,
+                               name,
+                               fmt::join(NearestNames(name, names, 3), ", ")));
 }
 
 std::vector<std::string> DbcFile::SignalNames() const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,6 +20,14 @@ enum class ByteOrder {
 
 enum class RawType { kUnsigned, kSigned, kFloat, kDouble };
 
+/// Values of a multiplexor, both ends included.
+struct MuxRange {
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+
+  [[nodiscard]] bool Contains(std::uint64_t value) const { return first <= value && value <= last; }
+};
+
 /// A number within a frame. Bit n of a frame is bit n % 8 of byte n / 8.
 struct DbcSignal {
   std::string name{};
@@ -31,26 +40,37 @@ struct DbcSignal {
   double minimum = 0.0;  ///< As the file says; equal to the maximum where it says nothing.
   double maximum = 0.0;
   std::string unit{};
+  std::string comment{};
+  /// Names of raw values, such as 3 "reverse"; values of 64 bits unsigned as their two's
+  /// complement.
+  std::map<std::int64_t, std::string> value_names{};
   bool is_multiplexor = false;  ///< Its raw value says which signals are in the frame.
-  std::optional<std::uint64_t>
-      mux_value{};  ///< In the frame only if the multiplexor has this value.
+  /// In the frame only if `multiplexor` has a value in one of these ranges; always if there are
+  /// none.
+  std::vector<MuxRange> mux_ranges{};
+  /// A signal of the same message. Empty with ranges: the file does not say which, so that the
+  /// signal is never found.
+  std::string multiplexor{};
 };
 
 struct DbcMessage {
   CanId id{};
   std::string name{};
-  int size = 0;  ///< Bytes.
+  /// Bytes. More than CanFrame::kMaxSize in files for J1939, whose long messages come in parts.
+  int size = 0;
+  std::string comment{};
+  std::optional<double> cycle_time_s{};  ///< Between two frames, if the file says so.
   std::vector<DbcSignal> signals{};
 
   /// @return nullptr when there is none.
   [[nodiscard]] const DbcSignal* FindSignal(std::string_view signal_name) const;
-  [[nodiscard]] const DbcSignal* multiplexor() const;
 };
 
 /// The messages and signals of a CAN database in Vector's DBC format.
 ///
-/// Understood are BO_, SG_ (with simple multiplexing) and SIG_VALTYPE_; every other section is
-/// passed over.
+/// Understood are BO_, SG_ with simple and, by SG_MUL_VAL_, extended multiplexing, SIG_VALTYPE_,
+/// VAL_, VAL_TABLE_, CM_ and the attribute GenMsgCycleTime; every other section is passed over.
+/// What such a section says of messages and signals that are not there is passed over, too.
 class DbcFile {
  public:
   /// @return kUnavailable when the file cannot be read; kInvalidInput with file, line and what is
@@ -61,13 +81,19 @@ class DbcFile {
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] const std::vector<DbcMessage>& messages() const { return messages_; }
 
+  /// @return nullptr when there is none.
+  [[nodiscard]] const DbcMessage* FindMessage(CanId id) const;
+  /// @return kInvalidInput, naming the file and the nearest names, when there is none.
+  [[nodiscard]] Result<const DbcMessage*> FindMessage(std::string_view name) const;
+
   struct SignalReference {
     const DbcMessage* message = nullptr;  ///< Of this file, never nullptr.
     const DbcSignal* signal = nullptr;
   };
   /// The signal called `MESSAGE.SIGNAL`.
   ///
-  /// @return kInvalidInput, naming the file and the nearest names, when there is none.
+  /// @return kInvalidInput, naming the file and the nearest names, when there is none, or no frame
+  ///         can be seen to hold it.
   [[nodiscard]] Result<SignalReference> FindSignal(std::string_view full_name) const;
 
  private:

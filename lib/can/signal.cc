@@ -1,5 +1,6 @@
 #include "can/signal.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -70,6 +71,11 @@ std::optional<std::uint64_t> RawBits(const DbcSignal& signal, double raw) {
 
 }  // namespace
 
+std::int64_t RawInteger(const DbcSignal& signal, std::uint64_t bits) {
+  return signal.type == RawType::kSigned ? SignExtend(bits, signal.length)
+                                         : static_cast<std::int64_t>(bits);
+}
+
 bool SignalFits(const DbcSignal& signal, std::size_t size) {
   if (signal.length < 1 || signal.start_bit < 0) return false;
   // The last bit in the order of transmission lies in the highest byte.
@@ -102,9 +108,17 @@ std::optional<double> DecodeSignal(const DbcSignal& signal, std::span<const std:
 bool IsPresent(const DbcMessage& message,
                const DbcSignal& signal,
                std::span<const std::uint8_t> payload) {
-  if (!signal.mux_value) return true;
-  const DbcSignal* multiplexor = message.multiplexor();
-  return multiplexor != nullptr && DecodeBits(*multiplexor, payload) == signal.mux_value;
+  // DbcFile has seen that the way up ends.
+  const DbcSignal* below = &signal;
+  while (!below->mux_ranges.empty()) {
+    const DbcSignal* const multiplexor = message.FindSignal(below->multiplexor);
+    if (multiplexor == nullptr) return false;
+    const auto value = DecodeBits(*multiplexor, payload);
+    const auto selects = [&](const MuxRange& range) { return value && range.Contains(*value); };
+    if (std::none_of(below->mux_ranges.begin(), below->mux_ranges.end(), selects)) return false;
+    below = multiplexor;
+  }
+  return true;
 }
 
 void EncodeBits(const DbcSignal& signal, std::uint64_t bits, std::span<std::uint8_t> payload) {

@@ -11,6 +11,9 @@
 
 namespace relocd {
 
+/// The raw value as VAL_ names it: sign-extended if the signal is signed.
+std::int64_t RawInteger(const DbcSignal& signal, std::uint64_t bits);
+
 /// Whether every bit of the signal lies within `size` bytes.
 bool SignalFits(const DbcSignal& signal, std::size_t size);
 
@@ -23,7 +26,7 @@ std::optional<std::uint64_t> DecodeBits(const DbcSignal& signal,
 /// value is a floating-point number that is not finite.
 std::optional<double> DecodeSignal(const DbcSignal& signal, std::span<const std::uint8_t> payload);
 
-/// Whether a frame of `message` with this payload has the signal, which its multiplexor decides.
+/// Whether a frame of `message` with this payload has the signal, which its multiplexors decide.
 bool IsPresent(const DbcMessage& message,
                const DbcSignal& signal,
                std::span<const std::uint8_t> payload);

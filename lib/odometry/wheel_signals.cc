@@ -15,6 +15,18 @@ Error Invalid(std::string message) {
   return {ErrorKind::kInvalidInput, std::move(message)};
 }
 
+/// The signal's name without its message's, which must be `message`; empty for an empty one.
+Result<std::string> NameInMessage(const char* key,
+                                  const std::string& full_name,
+                                  const DbcMessage& message) {
+  const auto dot = full_name.find('.');
+  if (full_name.empty() || full_name.substr(0, dot) == message.name) {
+    return dot == std::string::npos ? full_name : full_name.substr(dot + 1);
+  }
+  return Invalid(
+      fmt::format("{} is '{}', must be a signal of message {}", key, full_name, message.name));
+}
+
 bool IsInteger(const DbcSignal& signal) {
   return signal.type == RawType::kUnsigned || signal.type == RawType::kSigned;
 }
@@ -56,7 +68,9 @@ Result<void> WheelSignalsConfig::Validate() const {
   return {};
 }
 
-Result<WheelSignals> WheelSignals::Create(const WheelSignalsConfig& config, const DbcFile& dbc) {
+Result<WheelSignals> WheelSignals::Create(const WheelSignalsConfig& config,
+                                          const DbcFile& dbc,
+                                          const Rules& rules) {
   if (auto ok = config.Validate(); !ok) return std::move(ok).error();
   WheelSignals signals;
   signals.are_ticks_ = config.kind == "ticks";
@@ -68,7 +82,7 @@ Result<WheelSignals> WheelSignals::Create(const WheelSignalsConfig& config, cons
     if (name.empty()) continue;
     if (auto ok = signals.AddInput(name, dbc); !ok) return std::move(ok).error();
   }
-  if (auto ok = signals.AddGuards(config, dbc); !ok) return std::move(ok).error();
+  if (auto ok = signals.AddGuards(config, dbc, rules); !ok) return std::move(ok).error();
   return signals;
 }
 
@@ -93,40 +107,44 @@ Result<void> WheelSignals::AddInput(const std::string& name, const DbcFile& dbc)
   return {};
 }
 
-Result<void> WheelSignals::AddGuards(const WheelSignalsConfig& config, const DbcFile& dbc) {
-  if (!config.counter_signal.empty()) {
-    auto counter = FindGuard("counter_signal", config.counter_signal, dbc);
-    if (!counter) return std::move(counter).error();
-    counter_ = std::move(counter).value();
-    counter_step_ = static_cast<std::uint64_t>(config.counter_step);
+Result<void> WheelSignals::AddGuards(const WheelSignalsConfig& config,
+                                     const DbcFile& dbc,
+                                     const Rules& rules) {
+  const DbcMessage& left = inputs_.front().message;
+  for (const Input& input : inputs_) {
+    const auto given = rules.find(input.message.name);
+    MessageRule rule = given == rules.end() ? MessageRule() : given->second;
+    if (input.message.id == left.id) {
+      auto counter = NameInMessage("counter_signal", config.counter_signal, left);
+      if (!counter) return std::move(counter).error().WithContext(dbc.path());
+      auto checksum = NameInMessage("checksum_signal", config.checksum_signal, left);
+      if (!checksum) return std::move(checksum).error().WithContext(dbc.path());
+      if (!counter->empty()) {
+        rule.counter = *counter;
+        rule.counter_step = config.counter_step;
+      }
+      if (!checksum->empty()) {
+        rule.checksum = *checksum;
+        rule.checksum_rule = config.checksum_rule;
+      }
+    }
+    auto guard = MessageGuard::Create(rule, input.message);
+    if (!guard) return std::move(guard).error().WithContext(dbc.path());
+    guards_.emplace(input.message.id, std::move(guard).value());
   }
-  if (config.checksum_signal.empty()) return {};
-  auto checksum = FindGuard("checksum_signal", config.checksum_signal, dbc);
-  if (!checksum) return std::move(checksum).error();
-  if (checksum->length != 8) {
-    return Invalid(fmt::format("{}: checksum signal '{}' has {} bits, must have 8",
-                               dbc.path(),
-                               config.checksum_signal,
-                               checksum->length));
-  }
-  checksum_ = std::move(checksum).value();
-  checksum_rule_ = ParseChecksumRule(config.checksum_rule).value();
   return {};
 }
 
-Result<DbcSignal> WheelSignals::FindGuard(const char* key,
-                                          const std::string& name,
-                                          const DbcFile& dbc) const {
-  auto found = dbc.FindSignal(name);
-  if (!found) return std::move(found).error();
-  if (found->message->id != inputs_.front().message.id || !IsInteger(*found->signal)) {
-    return Invalid(fmt::format("{}: {} '{}', must be an integer in message {}",
-                               dbc.path(),
-                               key,
-                               name,
-                               inputs_.front().message.name));
+MessageGuard::Counters WheelSignals::counters() const {
+  MessageGuard::Counters sum;
+  for (const auto& [id, guard] : guards_) {
+    sum.frames += guard.counters().frames;
+    sum.bad_checksums += guard.counters().bad_checksums;
+    sum.stuck_counters += guard.counters().stuck_counters;
+    sum.short_frames += guard.counters().short_frames;
+    sum.missing_frames += guard.counters().missing_frames;
   }
-  return *found->signal;
+  return sum;
 }
 
 std::array<int, 2> WheelSignals::counter_bits() const {
@@ -152,7 +170,7 @@ std::optional<WheelSample> WheelSignals::Handle(const CanFrame& frame) {
   bool accepted = false;
   for (Input& input : inputs_) {
     if (input.message.id != frame.id) continue;
-    if (!accepted && !Accept(frame, input.message)) return std::nullopt;
+    if (!accepted && !Accept(frame)) return std::nullopt;
     accepted = true;
     Store(frame, input);
   }
@@ -160,38 +178,12 @@ std::optional<WheelSample> WheelSignals::Handle(const CanFrame& frame) {
   return TakeCompleteSet(frame.receive_time);
 }
 
-bool WheelSignals::Accept(const CanFrame& frame, const DbcMessage& message) {
-  ++counters_.frames;
-  if (frame.size < message.size) {
-    ++counters_.short_frames;
-    ++refused_frames_;
-    return false;
-  }
-  if (message.id != inputs_.front().message.id) return true;  // counter and checksum are not in it
-  if (checksum_ &&
-      DecodeBits(*checksum_, frame.payload()) != Checksum(checksum_rule_, frame, *checksum_)) {
-    ++counters_.bad_checksums;
-    ++refused_frames_;
-    return false;
-  }
-  return !counter_ || CheckCounter(frame);
-}
-
-bool WheelSignals::CheckCounter(const CanFrame& frame) {
-  const auto count = DecodeBits(*counter_, frame.payload());
-  if (!count) return false;
-  const std::uint64_t mask = ~std::uint64_t{0} >> static_cast<unsigned>(64 - counter_->length);
-  const std::uint64_t advance = last_count_ ? (*count - *last_count_) & mask : counter_step_;
-  last_count_ = count;
-  if (advance == 0) {
-    ++counters_.stuck_counters;
-    ++refused_frames_;
-    return false;
-  }
-  const auto missing = static_cast<int>((advance - 1) / counter_step_);
-  missing_frames_ += missing;
-  counters_.missing_frames += missing;
-  return true;
+bool WheelSignals::Accept(const CanFrame& frame) {
+  const MessageGuard::Judgement judgement = guards_.at(frame.id).Judge(frame);
+  missing_frames_ += judgement.missing_frames;
+  if (judgement.verdict == FrameVerdict::kValid) return true;
+  ++refused_frames_;
+  return false;
 }
 
 void WheelSignals::Store(const CanFrame& frame, Input& input) const {
@@ -200,9 +192,14 @@ void WheelSignals::Store(const CanFrame& frame, Input& input) const {
   if (!value) return;
   input.bits = DecodeBits(input.signal, frame.payload());
   input.value = *value * speed_unit_mps_;
+  input.time = frame.receive_time;
 }
 
 std::optional<WheelSample> WheelSignals::TakeCompleteSet(MonotonicTime time) {
+  for (Input& input : inputs_) {
+    // What waited too long for the other messages is of another time than they are.
+    if (time - input.time > guards_.at(input.message.id).max_age()) input.bits.reset();
+  }
   const bool complete = std::all_of(
       inputs_.begin(), inputs_.end(), [](const Input& input) { return input.bits.has_value(); });
   if (!complete) return std::nullopt;

@@ -3,13 +3,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "can/can_frame.h"
-#include "can/checksum.h"
 #include "can/dbc.h"
+#include "can/message_guard.h"
 #include "core/result.h"
 
 namespace relocd {
@@ -44,10 +45,10 @@ struct WheelSignalsConfig {
           self.counter_signal,
           "counts the frames of the left wheel's message; may be empty");
     visit("counter_step", self.counter_step, ">= 1; from one frame to the next");
-    visit("checksum_signal",
-          self.checksum_signal,
-          "8 bits, in the left wheel's message; may be empty");
-    visit("checksum_rule", self.checksum_rule, "none, toyota, xor8 or crc8_j1850");
+    visit("checksum_signal", self.checksum_signal, "in the left wheel's message; may be empty");
+    visit("checksum_rule",
+          self.checksum_rule,
+          "none, or as in can.messages, which is the place for the rules of more than one message");
   }
 
   /// @return kInvalidInput, naming the field, its value and what is allowed.
@@ -69,9 +70,14 @@ struct WheelSample {
 /// Thread-bound.
 class WheelSignals {
  public:
+  using Rules = std::map<std::string, MessageRule>;  ///< By the message's name.
+
+  /// @param rules  for any of the messages; the config's own is of the left wheel's.
   /// @return kInvalidInput, naming the DBC file, the signal and the nearest names, when the file
   ///         has no such signal; or what the signals cannot do together.
-  static Result<WheelSignals> Create(const WheelSignalsConfig& config, const DbcFile& dbc);
+  static Result<WheelSignals> Create(const WheelSignalsConfig& config,
+                                     const DbcFile& dbc,
+                                     const Rules& rules = {});
 
   /// The set of measurements that this frame completes.
   std::optional<WheelSample> Handle(const CanFrame& frame);
@@ -85,14 +91,8 @@ class WheelSignals {
   /// The frames that it needs, each once.
   [[nodiscard]] std::vector<CanId> ids() const;
 
-  struct Counters {
-    std::int64_t frames = 0;          ///< With wheel signals.
-    std::int64_t bad_checksums = 0;   ///< Refused.
-    std::int64_t stuck_counters = 0;  ///< Refused: the same count as the frame before.
-    std::int64_t short_frames = 0;    ///< Refused: not as long as the DBC file says.
-    std::int64_t missing_frames = 0;  ///< By the counter.
-  };
-  [[nodiscard]] const Counters& counters() const { return counters_; }
+  /// Of all messages with wheel signals.
+  [[nodiscard]] MessageGuard::Counters counters() const;
 
  private:
   /// One wheel's signal, and its value if this set has it already.
@@ -102,32 +102,24 @@ class WheelSignals {
     DbcSignal signal;
     std::optional<std::uint64_t> bits;
     double value = 0.0;  ///< m/s, for speeds.
+    MonotonicTime time{};
   };
 
   WheelSignals() = default;
 
   Result<void> AddInput(const std::string& name, const DbcFile& dbc);
-  Result<void> AddGuards(const WheelSignalsConfig& config, const DbcFile& dbc);
-  [[nodiscard]] Result<DbcSignal> FindGuard(const char* key,
-                                            const std::string& name,
-                                            const DbcFile& dbc) const;
-  /// Whether the frame may be used. Counts why not.
-  bool Accept(const CanFrame& frame, const DbcMessage& message);
-  bool CheckCounter(const CanFrame& frame);
+  Result<void> AddGuards(const WheelSignalsConfig& config, const DbcFile& dbc, const Rules& rules);
+  /// Whether the frame may be used. Remembers why not.
+  bool Accept(const CanFrame& frame);
   void Store(const CanFrame& frame, Input& input) const;
   std::optional<WheelSample> TakeCompleteSet(MonotonicTime time);
 
   bool are_ticks_ = true;
   double speed_unit_mps_ = 1.0;
   std::vector<Input> inputs_;  ///< Left, right, and perhaps front left, front right.
-  std::optional<DbcSignal> counter_;
-  std::uint64_t counter_step_ = 1;
-  std::optional<std::uint64_t> last_count_;
-  std::optional<DbcSignal> checksum_;
-  ChecksumRule checksum_rule_ = ChecksumRule::kNone;
+  std::map<CanId, MessageGuard> guards_;
   int refused_frames_ = 0;
   int missing_frames_ = 0;
-  Counters counters_;
 };
 
 }  // namespace relocd

@@ -94,10 +94,11 @@ Result<std::vector<CanFrame>> WheelFrameEncoder::Encode(const WheelReading& read
 Result<void> WheelFrameEncoder::EncodeField(const Field& field,
                                             const WheelReading& reading,
                                             CanFrame& frame) const {
-  if (field.signal.mux_value) {
-    EncodeBits(*messages_.at(field.message).message.multiplexor(),
-               *field.signal.mux_value,
-               frame.payload());
+  const DbcMessage& message = messages_.at(field.message).message;
+  for (const DbcSignal* below = &field.signal; !below->mux_ranges.empty();) {
+    const DbcSignal* const multiplexor = message.FindSignal(below->multiplexor);
+    EncodeBits(*multiplexor, below->mux_ranges.front().first, frame.payload());
+    below = multiplexor;
   }
   switch (field.content) {
     case Field::Content::kWheel:

@@ -101,6 +101,44 @@ TEST(WheelSignalsSetTest, WaitsForBothMessagesOfASet) {
   EXPECT_FALSE(signals.Handle(right));
 }
 
+/// Left and right wheel in messages of their own, each with a counter.
+constexpr const char* kTwoMessagesDbc =
+    "BO_ 1 L: 3 X\n SG_ SPEED : 0|16@1- (0.01,0) [0|0] \"m/s\" X\n"
+    " SG_ COUNT : 16|4@1+ (1,0) [0|0] \"\" X\n"
+    "BO_ 2 R: 3 X\n SG_ SPEED : 0|16@1- (0.01,0) [0|0] \"m/s\" X\n"
+    " SG_ COUNT : 16|4@1+ (1,0) [0|0] \"\" X\n";
+
+CanFrame SideFrame(std::uint32_t id, double time_s, std::uint8_t count) {
+  CanFrame frame;
+  frame.id.value = id;
+  frame.receive_time = MonotonicTime(FromSeconds(time_s));
+  frame.SetPayload(std::array<std::uint8_t, 3>{100, 0, count});
+  return frame;
+}
+
+TEST(WheelSignalsSetTest, JudgesEachMessageByItsOwnRule) {
+  const DbcFile dbc = Parse(kTwoMessagesDbc);
+  const WheelSignalsConfig config{
+      .kind = "speed", .left_signal = "L.SPEED", .right_signal = "R.SPEED"};
+  WheelSignals signals = WheelSignals::Create(config, dbc, {{"R", {.counter = "COUNT"}}}).value();
+  EXPECT_FALSE(signals.Handle(SideFrame(1, 0.0, 0)));
+  EXPECT_TRUE(signals.Handle(SideFrame(2, 0.0, 0)));
+  EXPECT_FALSE(signals.Handle(SideFrame(1, 0.1, 0)));  // stands, but nobody said that it counts
+  EXPECT_FALSE(signals.Handle(SideFrame(2, 0.1, 0)));
+  EXPECT_EQ(signals.counters().stuck_counters, 1);
+  EXPECT_TRUE(signals.Handle(SideFrame(2, 0.1, 1)));
+}
+
+TEST(WheelSignalsSetTest, DropsWhatWaitedTooLongForTheRest) {
+  const DbcFile dbc = Parse(kTwoMessagesDbc);
+  const WheelSignalsConfig config{
+      .kind = "speed", .left_signal = "L.SPEED", .right_signal = "R.SPEED"};
+  WheelSignals signals = WheelSignals::Create(config, dbc, {{"L", {.max_age_s = 0.05}}}).value();
+  EXPECT_FALSE(signals.Handle(SideFrame(1, 0.0, 0)));
+  EXPECT_FALSE(signals.Handle(SideFrame(2, 0.06, 0)));
+  EXPECT_TRUE(signals.Handle(SideFrame(1, 0.07, 0)));
+}
+
 std::string CreateError(const WheelSignalsConfig& config) {
   const auto signals = WheelSignals::Create(config, Parse(kWheelTicksDbc));
   return signals ? "" : signals.error().message;
@@ -117,8 +155,10 @@ TEST(WheelSignalsCreateTest, NamesTheSignalThatIsMissing) {
 TEST(WheelSignalsCreateTest, NamesAChecksumThatIsNone) {
   WheelSignalsConfig config = TicksConfig();
   config.checksum_signal = "WHEEL_TICKS.COUNTER";
-  EXPECT_EQ(CreateError(config),
-            "v.dbc: checksum signal 'WHEEL_TICKS.COUNTER' has 4 bits, must have 8");
+  EXPECT_EQ(
+      CreateError(config),
+      "v.dbc: checksum signal 'WHEEL_TICKS.COUNTER' has 4 bits from bit 48, must have 8, a whole "
+      "byte");
 }
 
 TEST(WheelSignalsConfigTest, AcceptsItsDefaultsAndNamesWhatIsWrong) {
@@ -129,7 +169,7 @@ TEST(WheelSignalsConfigTest, AcceptsItsDefaultsAndNamesWhatIsWrong) {
   EXPECT_EQ(error_of({}), "");
   EXPECT_EQ(error_of({.kind = "pulses"}), "kind is 'pulses', must be one of ticks, speed");
   EXPECT_EQ(error_of({.checksum_rule = "sum"}),
-            "checksum_rule is 'sum', must be one of none, toyota, xor8, crc8_j1850");
+            "checksum_rule is 'sum', must be one of " + ChecksumRuleNames());
   EXPECT_EQ(
       error_of({.checksum_rule = "xor8"}),
       "checksum_rule is 'xor8' and checksum_signal '', must be none with an empty signal, and "
