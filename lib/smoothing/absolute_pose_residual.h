@@ -1,83 +1,73 @@
 #pragma once
 
-#include <utility>
+#include <cmath>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <ceres/autodiff_cost_function.h>
+#include <Eigen/LU>
 
 #include "geometry/angle.h"
 #include "geometry/pose2.h"
 
 namespace relocd {
 
-/// How far the pose of a keyframe K is from a measured pose of F, a place at a known motion from K,
-/// in standard deviations.
+/// How far the pose of a keyframe K is from a measurement of F, a place at a known motion from K.
 ///
-/// With X_WF = X_WK * X_KF and the measurement X_WM, the residual is
-/// S * (R_WM^T * (p_WF - p_WM), wrap(yaw_WF - yaw_WM)), with S^T * S the inverse of the covariance.
-/// The parameter block is K's (x, y, yaw), in m and rad; the yaw need not be wrapped.
+/// With X_WF = X_WK * X_KF and the measurement X_WM, the error is
+/// (p_WF - p_WM, wrap(yaw_WF - yaw_WM)) along W's axes. It is weighted by an information matrix:
+/// the inverse of the covariance, in which a measurement without heading says nothing of the yaw. A
+/// pose is (x, y, yaw), in m and rad; its yaw need not be wrapped.
 class AbsolutePoseResidual {
  public:
-  using CostFunction = ceres::AutoDiffCostFunction<AbsolutePoseResidual, 3, 3>;
+  /// At one pose of K: the error, and its derivative.
+  struct Linearization {
+    Eigen::Vector3d error;
+    Eigen::Matrix3d by_K;
+  };
+
+  AbsolutePoseResidual() = default;
 
   /// @param covariance  3x3 of X_WM's right perturbation (x, y, yaw), positive definite.
-  AbsolutePoseResidual(const Pose2& X_WM, const Pose2& X_KF, const Eigen::Matrix3d& covariance)
-      : X_WM_(X_WM), X_KF_(X_KF), weight_(covariance.inverse().llt().matrixU()) {
-    const Eigen::Matrix2d R_MW = Eigen::Rotation2Dd(-X_WM.yaw()).toRotationMatrix();
-    weight_.leftCols<2>() = (weight_.leftCols<2>() * R_MW).eval();
+  static AbsolutePoseResidual OfPose(const Pose2& X_WM,
+                                     const Pose2& X_KF,
+                                     const Eigen::Matrix3d& covariance) {
+    AbsolutePoseResidual residual(X_WM, X_KF);
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    rotation.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(X_WM.yaw()).toRotationMatrix();
+    residual.information_ = rotation * covariance.inverse() * rotation.transpose();
+    return residual;
   }
 
-  template <typename T>
-  bool operator()(const T* x_WK, T* residual) const {
-    using Vector2 = Eigen::Matrix<T, 2, 1>;
-    const Vector2 p_WK(x_WK[0], x_WK[1]);
-    const Vector2 p_WF =
-        p_WK + Eigen::Rotation2D<T>(x_WK[2]) * X_KF_.translation().cast<T>().eval();
-
-    Eigen::Matrix<T, 3, 1> error;
-    error << p_WF - X_WM_.translation().cast<T>(), WrapAngle(x_WK[2] + X_KF_.yaw() - X_WM_.yaw());
-    Eigen::Map<Eigen::Matrix<T, 3, 1>> weighted(residual);
-    weighted = weight_.cast<T>() * error;
-    return true;
+  /// @param covariance  2x2 of p_WM along W's axes, positive definite.
+  static AbsolutePoseResidual OfPosition(const Eigen::Vector2d& p_WM,
+                                         const Pose2& X_KF,
+                                         const Eigen::Matrix2d& covariance) {
+    AbsolutePoseResidual residual(Pose2(p_WM.x(), p_WM.y(), 0.0), X_KF);
+    residual.information_.topLeftCorner<2, 2>() = covariance.inverse();
+    return residual;
   }
+
+  [[nodiscard]] Linearization Linearize(const Eigen::Vector3d& x_WK) const {
+    const double cosine = std::cos(x_WK.z());
+    const double sine = std::sin(x_WK.z());
+    const Eigen::Vector2d arm_W(cosine * X_KF_.x() - sine * X_KF_.y(),
+                                sine * X_KF_.x() + cosine * X_KF_.y());
+    Linearization result;
+    result.error << x_WK.head<2>() + arm_W - X_WM_.translation(),
+        WrapAngle(x_WK.z() + X_KF_.yaw() - X_WM_.yaw());
+    result.by_K << 1.0, 0.0, -arm_W.y(), 0.0, 1.0, arm_W.x(), 0.0, 0.0, 1.0;
+    return result;
+  }
+
+  [[nodiscard]] const Eigen::Matrix3d& information() const { return information_; }
 
  private:
+  AbsolutePoseResidual(const Pose2& X_WM, const Pose2& X_KF) : X_WM_(X_WM), X_KF_(X_KF) {}
+
   Pose2 X_WM_;
   Pose2 X_KF_;
-  /// S, which is upper triangular (matrixL() would weight wrongly), after the rotation to M's axes.
-  Eigen::Matrix3d weight_;
-};
-
-/// The same for a measured position without heading: S * (p_WF - p_WM), along W's axes.
-class AbsolutePositionResidual {
- public:
-  using CostFunction = ceres::AutoDiffCostFunction<AbsolutePositionResidual, 2, 3>;
-
-  /// @param p_KF        F's position in K.
-  /// @param covariance  2x2 of p_WM along W's axes, positive definite.
-  AbsolutePositionResidual(Eigen::Vector2d p_WM,
-                           Eigen::Vector2d p_KF,
-                           const Eigen::Matrix2d& covariance)
-      : p_WM_(std::move(p_WM)),
-        p_KF_(std::move(p_KF)),
-        sqrt_information_(covariance.inverse().llt().matrixU()) {}
-
-  template <typename T>
-  bool operator()(const T* x_WK, T* residual) const {
-    using Vector2 = Eigen::Matrix<T, 2, 1>;
-    const Vector2 p_WK(x_WK[0], x_WK[1]);
-    const Vector2 p_WF = p_WK + Eigen::Rotation2D<T>(x_WK[2]) * p_KF_.cast<T>().eval();
-    Eigen::Map<Vector2> weighted(residual);
-    weighted = sqrt_information_.cast<T>() * (p_WF - p_WM_.cast<T>());
-    return true;
-  }
-
- private:
-  Eigen::Vector2d p_WM_;
-  Eigen::Vector2d p_KF_;
-  Eigen::Matrix2d sqrt_information_;
+  Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();
 };
 
 }  // namespace relocd

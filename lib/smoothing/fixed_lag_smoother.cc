@@ -34,6 +34,12 @@ constexpr double kLostShare = 0.2;
 const Eigen::Vector3d kLeastSigmas(1e-3, 1e-3, 1e-4);
 /// Variance of an angle of which nothing is known.
 constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
+/// Room for so many fixes is made beforehand.
+constexpr std::size_t kUsualFixesPerKeyframe = 4;
+/// The misfit is measured anew when so many parts of the window's fixes are new, and used when it
+/// differs by more than this.
+constexpr int kMisfitParts = 30;
+constexpr double kMisfitChange = 0.05;
 /// Motion of a keyframe's first instant: its covariance must be positive definite.
 constexpr double kLeastVariance = 1e-10;
 /// Least distance and turn that make a body "moving" for the keyframes by time.
@@ -44,7 +50,8 @@ bool IsUsable(const Pose2& pose) {
 }
 
 /// Sane values only: a variance of 1e308 is finite, and its square is not.
-bool IsUsableCovariance(const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
+template <int Size>
+bool IsUsableCovariance(const Eigen::Matrix<double, Size, Size>& covariance) {
   constexpr double kLargest = 1e10;
   constexpr double kSmallest = 1e-12;
   return IsCovariance(covariance) && covariance.diagonal().maxCoeff() < kLargest &&
@@ -54,7 +61,7 @@ bool IsUsableCovariance(const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
 bool IsUsable(const Fix& fix) {
   if (fix.has_heading) return IsUsable(fix.X_WB) && IsUsableCovariance(fix.covariance);
   return fix.X_WB.translation().allFinite() &&
-         IsUsableCovariance(fix.covariance.topLeftCorner<2, 2>());
+         IsUsableCovariance(Eigen::Matrix2d(fix.covariance.topLeftCorner<2, 2>()));
 }
 
 double LargestPositionSigma(const Eigen::Matrix3d& covariance) {
@@ -101,7 +108,13 @@ FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
       weighting_(config.cauchy_scale_sigmas, config.fix_correlation_time_s),
       consensus_options_{.radius_sigmas = config.relocalization_radius_sigmas,
                          .min_radius_m = config.relocalization_min_radius_m},
-      history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)) {}
+      history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
+      chain_(static_cast<std::size_t>(config.window_keyframes) + 1) {
+  const auto keyframes = static_cast<std::size_t>(config.window_keyframes) + 1;
+  window_.keyframes.Reserve(keyframes);
+  window_.fixes.Reserve(keyframes * kUsualFixesPerKeyframe);
+  voters_.reserve(static_cast<std::size_t>(config.relocalization_window) + 1);
+}
 
 Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   if (!IsUsable(prior.X_WB) || !IsUsableCovariance(prior.covariance)) {
@@ -115,7 +128,13 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   }
   is_started_ = true;
   unstarted_fix_.reset();
+  for (Keyframe& keyframe : window_.keyframes) {
+    keyframe.fixes = 0;
+    keyframe.gated_fixes = 0;
+  }
   window_.fixes.clear();
+  extrapolated_fixes_ = 0;
+  chain_.Invalidate();
   voters_.clear();
   window_.last_removed_fix.reset();
   supports_since_start_ = 0;
@@ -134,6 +153,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   window_.prior = prior;
   window_.keyframes.front().SetX_WK(prior.X_WB);
   newest_covariance_ = prior.covariance;
+  chain_.Invalidate();
   return {};
 }
 
@@ -201,7 +221,6 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
   keyframe.X_PK = sample.X_KB;
   keyframe.covariance_PK = sample.covariance_KB;
   keyframe.SetX_WK(before.X_WK() * sample.X_KB);
-  keyframe.motion_residual = MakeMotionResidual(keyframe);
   newest_covariance_ = ComposeCovariance(newest_covariance_, sample.X_KB, sample.covariance_KB);
   window_.keyframes.push_back(std::move(keyframe));
 
@@ -214,21 +233,35 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
 }
 
 void FixedLagSmoother::RemoveOldest() {
+  const std::int64_t id = window_.keyframes.front().id;
+  const AttachedFix* const end = window_.FirstFix(id + 1);
+  if (on_leave_) on_leave_(window_.keyframes.front(), {window_.fixes.begin(), end});
+  extrapolated_fixes_ -= static_cast<int>(
+      std::count_if(window_.fixes.begin(), window_.FirstFix(id + 1), [](const AttachedFix& fix) {
+        return fix.is_extrapolated;
+      }));
   const bool had_prior = window_.prior.has_value();
-  RemovedKeyframe removed = MarginalizeOldest(window_, weighting_);
+  chain_.MarginalizeOldest(window_, weighting_);
   // Before the start the estimates mean nothing, and so would a prior from them.
   if (!is_started_ && !had_prior) window_.prior.reset();
-  if (on_leave_) on_leave_(std::move(removed));
 }
 
 void FixedLagSmoother::ReattachExtrapolated() {
-  for (auto fix = window_.fixes.rbegin(); fix != window_.fixes.rend(); ++fix) {
-    if (!fix->is_extrapolated || fix->fix.time > history_.newest().time) continue;
-    const auto sample = history_.At(fix->fix.time);
+  if (extrapolated_fixes_ == 0) return;
+  for (AttachedFix& fix : window_.fixes) {
+    if (!fix.is_extrapolated || fix.fix.time > history_.newest().time) continue;
+    const auto sample = history_.At(fix.fix.time);
     if (!sample || !window_.Has(sample->keyframe_id)) continue;
-    const bool is_gated = fix->is_gated;
-    *fix = Attach(fix->fix, *sample);
-    fix->is_gated = is_gated;
+    AttachedFix attached = Attach(fix.fix, *sample);
+    attached.is_gated = fix.is_gated;
+    --(fix.is_gated ? window_.Get(fix.keyframe_id).gated_fixes
+                    : window_.Get(fix.keyframe_id).fixes);
+    ++(fix.is_gated ? window_.Get(attached.keyframe_id).gated_fixes
+                    : window_.Get(attached.keyframe_id).fixes);
+    const std::int64_t id = std::min(fix.keyframe_id, attached.keyframe_id);
+    fix = attached;
+    --extrapolated_fixes_;
+    NoteFixesChanged(id);
   }
 }
 
@@ -239,25 +272,20 @@ AttachedFix FixedLagSmoother::Attach(const Fix& fix, const OdometrySample& sampl
   attached.X_KF = sample.X_KB;
   attached.covariance_KF = sample.covariance_KB;
   attached.is_extrapolated = sample.is_extrapolated;
-  attached.residual = MakeFixResidual(attached);
+  PrepareResidual(attached);
   return attached;
 }
 
 void FixedLagSmoother::Insert(AttachedFix fix) {
-  const auto after = std::upper_bound(
-      window_.fixes.begin(),
-      window_.fixes.end(),
-      fix.fix.time,
-      [](MonotonicTime time, const AttachedFix& other) { return time < other.fix.time; });
-  window_.fixes.insert(after, std::move(fix));
+  if (fix.is_extrapolated) ++extrapolated_fixes_;
+  const std::int64_t id = fix.keyframe_id;
+  window_.Insert(std::move(fix));
+  NoteFixesChanged(id);
 }
 
-bool FixedLagSmoother::IsFull(std::int64_t keyframe_id) const {
-  const auto count =
-      std::count_if(window_.fixes.begin(), window_.fixes.end(), [&](const AttachedFix& fix) {
-        return fix.keyframe_id == keyframe_id && !fix.is_gated;
-      });
-  return count >= config_.max_fixes_per_keyframe;
+void FixedLagSmoother::NoteFixesChanged(std::int64_t keyframe_id) {
+  chain_.FixesChanged(keyframe_id,
+                      UpdateShares(window_, config_.fix_correlation_time_s, keyframe_id));
 }
 
 bool FixedLagSmoother::PassesGate(const AttachedFix& fix) const {
@@ -302,7 +330,9 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
   AttachedFix attached = Attach(fix, *sample);
   if (!is_started_) {
     if (!unstarted_fix_ || fix.time > unstarted_fix_->time) unstarted_fix_ = fix;
-    if (!IsFull(sample->keyframe_id)) Insert(std::move(attached));
+    if (window_.Get(sample->keyframe_id).fixes < config_.max_fixes_per_keyframe) {
+      Insert(std::move(attached));
+    }
     ++counters_.fixes_accepted;
     NoteSupport(*sample);
     TryStart();
@@ -310,9 +340,12 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
   }
 
   attached.is_gated = !PassesGate(attached);
-  const FixOutcome outcome = attached.is_gated             ? FixOutcome::kGated
-                             : IsFull(sample->keyframe_id) ? FixOutcome::kRedundant
-                                                           : FixOutcome::kAccepted;
+  const Keyframe& keyframe = window_.Get(sample->keyframe_id);
+  const bool is_full =
+      (attached.is_gated ? keyframe.gated_fixes : keyframe.fixes) >= config_.max_fixes_per_keyframe;
+  const FixOutcome outcome = attached.is_gated ? FixOutcome::kGated
+                             : is_full         ? FixOutcome::kRedundant
+                                               : FixOutcome::kAccepted;
   if (outcome != FixOutcome::kGated) NoteSupport(*sample);
   if (outcome == FixOutcome::kAccepted) {
     ++counters_.fixes_accepted;
@@ -320,7 +353,7 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
     SolveWindow(config_.max_iterations);
   } else if (outcome == FixOutcome::kGated) {
     ++counters_.fixes_gated;
-    Insert(std::move(attached));
+    if (!is_full) Insert(std::move(attached));
   } else {
     ++counters_.fixes_redundant;
   }
@@ -389,8 +422,15 @@ void FixedLagSmoother::Reseed(const Pose2& X_WO) {
   }
   for (AttachedFix& fix : window_.fixes)
     fix.is_gated = false;
+  for (Keyframe& keyframe : window_.keyframes) {
+    keyframe.fixes += keyframe.gated_fixes;
+    keyframe.gated_fixes = 0;
+  }
   window_.prior.reset();
   window_.last_removed_fix.reset();
+  UpdateAllShares(window_, config_.fix_correlation_time_s);
+  chain_.Invalidate();
+  fixes_until_misfit_ = 0;
   SolveWindow(kStartIterations);
 }
 
@@ -466,24 +506,33 @@ void FixedLagSmoother::CutBefore(std::int64_t keyframe_id) {
 }
 
 void FixedLagSmoother::SolveWindow(int max_iterations) {
-  const bool solved = Solve(window_, weighting_, max_iterations);
-  const Eigen::Matrix3d covariance =
-      NewestCovariance(window_, weighting_.WithMisfit(EstimateMisfit(window_, weighting_)));
-  if (solved && IsCovariance(covariance)) {
-    newest_covariance_ = covariance;
-    return;
+  if (--fixes_until_misfit_ <= 0) {
+    fixes_until_misfit_ = static_cast<int>(window_.fixes.size()) / kMisfitParts;
+    const double misfit = misfit_.Estimate(window_, weighting_);
+    const double change = std::abs(misfit / weighting_.misfit() - 1.0);
+    if (change > kMisfitChange) weighting_.SetMisfit(misfit);
+  }
+  if (chain_.Solve(window_, weighting_, max_iterations)) {
+    newest_covariance_ = chain_.NewestCovariance();
+    if (IsCovariance(newest_covariance_)) return;
   }
   ++counters_.solver_failures;
   RestartAtNewest();
 }
 
 void FixedLagSmoother::RestartAtNewest() {
-  Keyframe newest = std::move(window_.keyframes.back());
+  Keyframe newest = window_.keyframes.back();
   constexpr double kDoubt = 4.0;
   newest_covariance_ *= kDoubt;
   newest_covariance_.diagonal() += kLeastSigmas.cwiseAbs2();
   if (!IsCovariance(newest_covariance_)) newest_covariance_ = Eigen::Matrix3d::Identity();
-  window_ = KeyframeWindow();
+  window_.keyframes.clear();
+  window_.fixes.clear();
+  extrapolated_fixes_ = 0;
+  window_.last_removed_fix.reset();
+  chain_.Invalidate();
+  newest.fixes = 0;
+  newest.gated_fixes = 0;
   window_.prior = PlanarPose{.X_WB = newest.X_WK(), .covariance = newest_covariance_};
   window_.keyframes.push_back(std::move(newest));
 }

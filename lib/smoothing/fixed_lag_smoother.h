@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <optional>
 #include <span>
@@ -15,8 +14,10 @@
 #include "core/time.h"
 #include "geometry/planar.h"
 #include "geometry/pose2.h"
+#include "smoothing/chain_solver.h"
 #include "smoothing/consensus.h"
 #include "smoothing/fix.h"
+#include "smoothing/fix_misfit.h"
 #include "smoothing/keyframe_window.h"
 #include "smoothing/pose_history.h"
 #include "smoothing/smoother_config.h"
@@ -91,8 +92,8 @@ class FixedLagSmoother {
   /// `config` must be valid.
   explicit FixedLagSmoother(const SmootherConfig& config);
 
-  /// Gets each keyframe that leaves the window, with its fixes: for smoothing a whole log.
-  using LeaveHandler = std::function<void(RemovedKeyframe)>;
+  /// Sees each keyframe that leaves the window, and its fixes: for smoothing a whole log.
+  using LeaveHandler = std::function<void(const Keyframe&, std::span<const AttachedFix>)>;
   void OnLeave(LeaveHandler handler) { on_leave_ = std::move(handler); }
 
   /// Starts at, or jumps to, a pose that somebody knows: from a saved state, or set by hand. The
@@ -129,7 +130,7 @@ class FixedLagSmoother {
 
   [[nodiscard]] AttachedFix Attach(const Fix& fix, const OdometrySample& sample) const;
   void Insert(AttachedFix fix);
-  [[nodiscard]] bool IsFull(std::int64_t keyframe_id) const;
+  void NoteFixesChanged(std::int64_t keyframe_id);
   [[nodiscard]] bool PassesGate(const AttachedFix& fix) const;
   void Remember(const Fix& fix, const OdometrySample& sample);
   void NoteSupport(const OdometrySample& sample);
@@ -165,6 +166,10 @@ class FixedLagSmoother {
 
   PoseHistory history_;
   KeyframeWindow window_;
+  ChainSolver chain_;
+  FixMisfit misfit_;
+  int fixes_until_misfit_ = 0;
+  int extrapolated_fixes_ = 0;                                   ///< In the window.
   Eigen::Matrix3d newest_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the newest keyframe.
   std::vector<Voter> voters_;                                    ///< By time, the newest last.
 

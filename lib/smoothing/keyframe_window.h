@@ -1,19 +1,18 @@
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <deque>
-#include <memory>
 #include <optional>
-#include <vector>
 
 #include <Eigen/Core>
-#include <ceres/cost_function.h>
 
 #include "core/time.h"
 #include "geometry/planar.h"
 #include "geometry/pose2.h"
+#include "smoothing/absolute_pose_residual.h"
 #include "smoothing/fix.h"
+#include "smoothing/relative_pose_residual.h"
+#include "smoothing/sliding_vector.h"
 
 namespace relocd {
 
@@ -22,17 +21,19 @@ struct Keyframe {
   std::int64_t id = 0;  ///< One more than the keyframe before.
   MonotonicTime time{};
   Pose2 X_OB;
-  std::array<double, 3> x_WK{};  ///< The estimate X_WK, as Ceres sees it.
-  Pose2 X_PK;                    ///< The motion from the keyframe before (P).
+  Eigen::Vector3d x_WK = Eigen::Vector3d::Zero();  ///< The estimate X_WK: x, y, unwrapped yaw.
+  Pose2 X_PK;                                      ///< The motion from the keyframe before (P).
   Eigen::Matrix3d covariance_PK = Eigen::Matrix3d::Identity();
-  std::unique_ptr<ceres::CostFunction> motion_residual;  ///< Null in the very first.
   /// How often the estimates had been started anew when this one was last estimated.
   std::int64_t generation = 0;
+  int fixes = 0;        ///< That are attached to it and have influence.
+  int gated_fixes = 0;  ///< That are attached to it and have none.
   bool is_cut =
       false;  ///< The body was carried here: the motion from the keyframe before is wrong.
 
-  [[nodiscard]] Pose2 X_WK() const { return {x_WK[0], x_WK[1], x_WK[2]}; }
-  void SetX_WK(const Pose2& X_WK) { x_WK = {X_WK.x(), X_WK.y(), X_WK.yaw()}; }
+  [[nodiscard]] Pose2 X_WK() const { return {x_WK.x(), x_WK.y(), x_WK.z()}; }
+  void SetX_WK(const Pose2& X_WK) { x_WK << X_WK.translation(), X_WK.yaw(); }
+  [[nodiscard]] RelativePoseResidual MotionResidual() const { return {X_PK, covariance_PK}; }
 };
 
 /// A fix at the place F, and the motion to F from the keyframe before it.
@@ -44,29 +45,39 @@ struct AttachedFix {
   bool is_extrapolated =
       false;              ///< X_KF is a prediction, to be replaced when the odometry is there.
   bool is_gated = false;  ///< Kept, but without influence.
-  std::unique_ptr<ceres::CostFunction> residual;
+  double share = 0.0;     ///< Of it that is news, by UpdateShares.
+  double sigma_m = 0.0;   ///< Of its position, the motion from the keyframe included.
+  AbsolutePoseResidual residual;
 };
 
-/// How fixes are weighted: the Cauchy kernel, and their correlation with each other.
+/// Fills in `residual` and `sigma_m` from the other members.
+void PrepareResidual(AttachedFix& fix);
+
+/// How fixes are weighted: by a Cauchy kernel, and by how much they err together.
 class FixWeighting {
  public:
   FixWeighting(double cauchy_scale_sigmas, double correlation_time_s);
 
   [[nodiscard]] double cauchy_scale_sigmas() const { return cauchy_scale_sigmas_; }
   [[nodiscard]] double correlation_time_s() const { return correlation_time_s_; }
-  /// How much more a fix under the kernel tells, when errors are Gaussian, than its weight says.
-  [[nodiscard]] double InformationCorrection(bool has_heading) const {
-    return (has_heading ? correction_with_heading_ : correction_without_heading_) / misfit_;
+
+  /// A fix weighs so many times what its covariance says, before the kernel and the misfit: its
+  /// share that is news, and what the kernel takes from good fixes for its own sake alone.
+  [[nodiscard]] double BaseWeight(const AttachedFix& fix) const {
+    return fix.share *
+           (fix.fix.has_heading ? correction_with_heading_ : correction_without_heading_);
   }
+  /// The kernel's weight of a squared error in squared standard deviations.
+  [[nodiscard]] double KernelWeight(double squared_error) const {
+    return 1.0 / (1.0 + squared_error / (cauchy_scale_sigmas_ * cauchy_scale_sigmas_));
+  }
+  /// All fixes tell so many times less than if they erred independently.
+  [[nodiscard]] double misfit() const { return misfit_; }
+  void SetMisfit(double misfit) { misfit_ = misfit; }
+
   /// Mean square of a fix's pull, its whitened position error times its weight, when errors are
   /// Gaussian.
   [[nodiscard]] double ExpectedSquaredPull() const { return expected_squared_pull_; }
-  /// The same, for covariances, with every fix telling `misfit` times less.
-  [[nodiscard]] FixWeighting WithMisfit(double misfit) const {
-    FixWeighting weighting = *this;
-    weighting.misfit_ = misfit;
-    return weighting;
-  }
 
  private:
   double cauchy_scale_sigmas_;
@@ -79,8 +90,8 @@ class FixWeighting {
 
 /// A chain of keyframes with fixes on them, and what is known of its oldest from those before.
 struct KeyframeWindow {
-  std::deque<Keyframe> keyframes;
-  std::deque<AttachedFix> fixes;                  ///< By time.
+  SlidingVector<Keyframe> keyframes;
+  SlidingVector<AttachedFix> fixes;               ///< By time.
   std::optional<PlanarPose> prior;                ///< Of the oldest keyframe.
   std::optional<MonotonicTime> last_removed_fix;  ///< The next one may be correlated with it.
 
@@ -88,45 +99,25 @@ struct KeyframeWindow {
   [[nodiscard]] Keyframe& Get(std::int64_t keyframe_id);
   [[nodiscard]] const Keyframe& Get(std::int64_t keyframe_id) const;
   [[nodiscard]] Pose2 X_WF(const AttachedFix& fix) const;
+  /// The first fix that is not of an older keyframe than this one.
+  [[nodiscard]] AttachedFix* FirstFix(std::int64_t keyframe_id);
+
+  /// Puts a fix in its place by time, and counts it with its keyframe.
+  AttachedFix& Insert(AttachedFix fix);
+  /// Takes the oldest keyframe and its fixes out. The window must have two keyframes.
+  void PopFront();
 };
 
-/// Makes the residual of an attached fix from its other members.
-std::unique_ptr<ceres::CostFunction> MakeFixResidual(const AttachedFix& fix);
-/// Makes the residual of a keyframe's motion from its other members.
-std::unique_ptr<ceres::CostFunction> MakeMotionResidual(const Keyframe& keyframe);
+/// What is known of a keyframe where there is no prior: nothing, within the size of any map.
+inline const Eigen::Vector3d kUnknownSigmas(1e4, 1e4, 10.0);
 
-/// Moves the estimates to a minimum of the squared residuals, nearer by `max_iterations` steps.
+/// Sets the share of each fix that is news: fixes closer in time than they are independent share
+/// the information of one, and those of one keyframe, one place, do not count as more than one.
 ///
-/// One thread, no clock, one solver: the same window gives the same bits on each run.
-///
-/// @return whether the estimates are usable; if not, they are as before.
-bool Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
-
-/// By how much the fixes' pull on the estimates varies more than that of independent fixes with the
-/// stated covariances would, at least 1: errors that last, as those of a network that knows a place
-/// badly, average out more slowly than their number says.
-///
-/// The long-run variance of Newey and West (1987) of the fixes' pulls over that expected. With few
-/// fixes it leans on what is usual for scene coordinates: eight that count as one.
-double EstimateMisfit(const KeyframeWindow& window, const FixWeighting& weighting);
-
-/// Covariance of the newest keyframe's right perturbation given all in the window, linearised at
-/// the estimates: the prior carried through the chain, motion by motion and fix by fix, which is
-/// the elimination of all other keyframes, in 3x3 blocks.
-Eigen::Matrix3d NewestCovariance(const KeyframeWindow& window, const FixWeighting& weighting);
-
-/// The same for every keyframe, given also what comes after it.
-std::vector<Eigen::Matrix3d> SmoothedCovariances(const KeyframeWindow& window,
-                                                 const FixWeighting& weighting);
-
-/// Removes the oldest keyframe and its fixes, and leaves what they say of the next one as its
-/// prior. The window must have two keyframes.
-///
-/// @return what was removed.
-struct RemovedKeyframe {
-  Keyframe keyframe;
-  std::vector<AttachedFix> fixes;
-};
-RemovedKeyframe MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting);
+/// Goes on from the fixes of the keyframe `first_id` to those of the next keyframe that has some,
+/// as far as a change at `first_id` reaches. @return the id of the last one whose fixes it set.
+std::int64_t UpdateShares(KeyframeWindow& window, double correlation_time_s, std::int64_t first_id);
+/// The same for all fixes.
+void UpdateAllShares(KeyframeWindow& window, double correlation_time_s);
 
 }  // namespace relocd

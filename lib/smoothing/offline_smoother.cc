@@ -1,21 +1,26 @@
 #include "smoothing/offline_smoother.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <utility>
 
+#include "smoothing/batch_solver.h"
+#include "smoothing/chain_solver.h"
 #include "smoothing/consensus.h"
+#include "smoothing/fix_misfit.h"
 #include "smoothing/keyframe_window.h"
 #include "smoothing/motion_covariance.h"
 #include "smoothing/pose_history.h"
 
 namespace relocd {
 namespace {
+
+constexpr int kBatchIterations = 200;
 
 /// Feeds a log to a smoother in the order of time, and calls `after_fix` after each fix.
 template <typename AfterFix>
@@ -39,15 +44,14 @@ void Feed(const MotionLog& log, FixedLagSmoother& smoother, AfterFix after_fix) 
 KeyframeWindow CollectKeyframes(const MotionLog& log, const SmootherConfig& config) {
   FixedLagSmoother smoother(config);
   KeyframeWindow all;
-  const auto append = [&all](RemovedKeyframe removed) {
-    all.keyframes.push_back(std::move(removed.keyframe));
-    std::move(removed.fixes.begin(), removed.fixes.end(), std::back_inserter(all.fixes));
-  };
-  smoother.OnLeave(append);
+  smoother.OnLeave([&all](const Keyframe& keyframe, std::span<const AttachedFix> fixes) {
+    all.keyframes.push_back(keyframe);
+    std::copy(fixes.begin(), fixes.end(), std::back_inserter(all.fixes));
+  });
   Feed(log, smoother, [](const Fix&) {});
   KeyframeWindow rest = std::move(smoother).TakeWindow();
-  std::move(rest.keyframes.begin(), rest.keyframes.end(), std::back_inserter(all.keyframes));
-  std::move(rest.fixes.begin(), rest.fixes.end(), std::back_inserter(all.fixes));
+  std::copy(rest.keyframes.begin(), rest.keyframes.end(), std::back_inserter(all.keyframes));
+  std::copy(rest.fixes.begin(), rest.fixes.end(), std::back_inserter(all.fixes));
   return all;
 }
 
@@ -77,51 +81,45 @@ std::vector<int> SupportersOfStretches(const KeyframeWindow& all, const Consensu
   return supporters;
 }
 
-std::vector<std::array<double, 3>> TakeEstimates(const KeyframeWindow& all) {
-  std::vector<std::array<double, 3>> estimates;
+std::vector<Eigen::Vector3d> TakeEstimates(const KeyframeWindow& all) {
+  std::vector<Eigen::Vector3d> estimates;
   for (const Keyframe& keyframe : all.keyframes)
     estimates.push_back(keyframe.x_WK);
   return estimates;
 }
 
-void PutEstimates(const std::vector<std::array<double, 3>>& estimates, KeyframeWindow& all) {
+void PutEstimates(const std::vector<Eigen::Vector3d>& estimates, KeyframeWindow& all) {
   for (std::size_t i = 0; i < estimates.size(); ++i)
     all.keyframes[i].x_WK = estimates[i];
-}
-
-void ScaleMotionCovariance(double factor, Keyframe& keyframe) {
-  keyframe.covariance_PK *= factor;
-  keyframe.motion_residual = MakeMotionResidual(keyframe);
 }
 
 /// Solves over all keyframes. Where the smoother cut the chain because the body seemed to have been
 /// carried, the whole log knows better: the motion is believed unless a stretch then loses most of
 /// the fixes that support it.
 void SolveAll(const FixWeighting& weighting, const ConsensusOptions& options, KeyframeWindow& all) {
-  constexpr int kIterations = 200;
   constexpr double kCarriedFactor = 1e7;
   FollowNewStarts(all);
   const bool has_cuts = std::any_of(
       all.keyframes.begin(), all.keyframes.end(), [](const Keyframe& k) { return k.is_cut; });
   if (!has_cuts) {
-    Solve(all, weighting, kIterations);
+    SolveBatch(all, weighting, kBatchIterations);
     return;
   }
   for (Keyframe& keyframe : all.keyframes) {
-    if (keyframe.is_cut) ScaleMotionCovariance(kCarriedFactor, keyframe);
+    if (keyframe.is_cut) keyframe.covariance_PK *= kCarriedFactor;
   }
-  Solve(all, weighting, kIterations);
+  SolveBatch(all, weighting, kBatchIterations);
   const std::vector<int> with_cuts = SupportersOfStretches(all, options);
-  const std::vector<std::array<double, 3>> estimates = TakeEstimates(all);
+  const std::vector<Eigen::Vector3d> estimates = TakeEstimates(all);
 
   for (Keyframe& keyframe : all.keyframes) {
-    if (keyframe.is_cut) ScaleMotionCovariance(1.0 / kCarriedFactor, keyframe);
+    if (keyframe.is_cut) keyframe.covariance_PK *= 1.0 / kCarriedFactor;
   }
   for (std::size_t i = all.keyframes.size(); i-- > 1;) {
     const Keyframe& after = all.keyframes[i];
     all.keyframes[i - 1].SetX_WK(after.X_WK() * after.X_PK.Inverse());
   }
-  Solve(all, weighting, kIterations);
+  SolveBatch(all, weighting, kBatchIterations);
   const std::vector<int> joined = SupportersOfStretches(all, options);
   bool is_carried = false;
   for (std::size_t i = 0; i < joined.size(); ++i) {
@@ -130,7 +128,7 @@ void SolveAll(const FixWeighting& weighting, const ConsensusOptions& options, Ke
   if (!is_carried) return;
   PutEstimates(estimates, all);
   for (Keyframe& keyframe : all.keyframes) {
-    if (keyframe.is_cut) ScaleMotionCovariance(kCarriedFactor, keyframe);
+    if (keyframe.is_cut) keyframe.covariance_PK *= kCarriedFactor;
   }
 }
 
@@ -233,13 +231,18 @@ std::vector<SmootherEstimate> SmoothAll(const MotionLog& log, const SmootherConf
   if (!is_started) return estimates;
   for (AttachedFix& fix : all.fixes)
     fix.is_gated = false;
-  const FixWeighting weighting(config.cauchy_scale_sigmas, config.fix_correlation_time_s);
-  SolveAll(weighting,
-           {.radius_sigmas = config.relocalization_radius_sigmas,
-            .min_radius_m = config.relocalization_min_radius_m},
-           all);
+  UpdateAllShares(all, config.fix_correlation_time_s);
+  FixWeighting weighting(config.cauchy_scale_sigmas, config.fix_correlation_time_s);
+  const ConsensusOptions consensus_options{.radius_sigmas = config.relocalization_radius_sigmas,
+                                           .min_radius_m = config.relocalization_min_radius_m};
+  FixMisfit misfit;
+  weighting.SetMisfit(misfit.Estimate(all, weighting));
+  SolveAll(weighting, consensus_options, all);
+  // The whole log's own misfit, from estimates that are near enough to the best ones.
+  weighting.SetMisfit(misfit.Estimate(all, weighting));
+  SolveBatch(all, weighting, kBatchIterations);
   const std::vector<Eigen::Matrix3d> covariances =
-      SmoothedCovariances(all, weighting.WithMisfit(EstimateMisfit(all, weighting)));
+      ChainSolver(all.keyframes.size()).SmoothedCovariances(all, weighting);
   const OdometryLookup odometry(log, all, config);
   for (SmootherEstimate& estimate : estimates) {
     const auto sample = odometry.At(estimate.time);

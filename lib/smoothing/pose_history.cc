@@ -33,7 +33,7 @@ OdometrySample PoseHistory::MoveOn(const OdometrySample& before,
 
 std::optional<OdometrySample> PoseHistory::At(MonotonicTime time) const {
   if (samples_.empty() || time < samples_.front().time) return std::nullopt;
-  const auto after = std::lower_bound(
+  const OdometrySample* const after = std::lower_bound(
       samples_.begin(), samples_.end(), time, [](const OdometrySample& sample, MonotonicTime t) {
         return sample.time < t;
       });

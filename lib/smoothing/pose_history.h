@@ -2,13 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 
 #include <Eigen/Core>
 
 #include "core/time.h"
 #include "geometry/pose2.h"
+#include "smoothing/sliding_vector.h"
 
 namespace relocd {
 
@@ -56,7 +56,7 @@ class PoseHistory {
 
   Duration reach_;
   Duration max_extrapolation_;
-  std::deque<OdometrySample> samples_;
+  SlidingVector<OdometrySample> samples_;
 };
 
 }  // namespace relocd

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/covariance.h"
+#include "smoothing/batch_solver.h"
 #include "smoothing/offline_smoother.h"
 #include "smoothing/simulated_drive.h"
 #include "support/error_statistics.h"
@@ -130,7 +131,7 @@ TEST(FixedLagSmootherTest, IsAtTheMinimumOfItsWindow) {
   const Pose2 X_KB = smoother.window().keyframes.back().X_WK().Inverse() * X_WB;
   const FixWeighting weighting = smoother.weighting();
   KeyframeWindow window = std::move(smoother).TakeWindow();
-  ASSERT_TRUE(Solve(window, weighting, 200));
+  ASSERT_TRUE(SolveBatch(window, weighting, 200));
   EXPECT_LT(PositionError(window.keyframes.back().X_WK() * X_KB, X_WB), 0.06);
 }
 

@@ -1,4 +1,3 @@
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -31,11 +30,15 @@ Eigen::Vector3d Block(const Pose2& pose, int turns = 0) {
   return {pose.x(), pose.y(), pose.yaw() + turns * 2.0 * std::numbers::pi};
 }
 
-template <int Size, typename Residual, typename... Blocks>
-Eigen::Matrix<double, Size, 1> Evaluate(const Residual& residual, const Blocks&... blocks) {
-  Eigen::Matrix<double, Size, 1> value;
-  EXPECT_TRUE(residual(blocks.data()..., value.data()));
-  return value;
+double SquaredNorm(const RelativePoseResidual& residual,
+                   const Eigen::Vector3d& x_WA,
+                   const Eigen::Vector3d& x_WB) {
+  return SquaredMahalanobis(residual.Linearize(x_WA, x_WB).error, residual.covariance());
+}
+
+double SquaredNorm(const AbsolutePoseResidual& residual, const Eigen::Vector3d& x_WK) {
+  const Eigen::Vector3d error = residual.Linearize(x_WK).error;
+  return error.dot(residual.information() * error);
 }
 
 TEST(RelativePoseResidualTest, IsZeroForTheMeasuredMotionAlsoAcrossPi) {
@@ -44,9 +47,14 @@ TEST(RelativePoseResidualTest, IsZeroForTheMeasuredMotionAlsoAcrossPi) {
     const Pose2 X_WA = random.Pose();
     const Pose2 X_AB = random.Pose();
     const RelativePoseResidual residual(X_AB, CorrelatedCovariance(random));
-    const Eigen::Vector3d value = Evaluate<3>(residual, Block(X_WA, 2), Block(X_WA * X_AB, -1));
-    EXPECT_THAT(value, IsNear(Eigen::Vector3d(0.0, 0.0, 0.0), 1e-9)) << X_WA << " " << X_AB;
+    const Eigen::Vector3d error = residual.Linearize(Block(X_WA, 2), Block(X_WA * X_AB, -1)).error;
+    EXPECT_THAT(error, IsNear(Eigen::Vector3d(0.0, 0.0, 0.0), 1e-9)) << X_WA << " " << X_AB;
   }
+}
+
+/// Small, so that a perturbation's tangent and its translation are the same to first order.
+Eigen::Vector3d SmallPerturbation(TestRandom& random) {
+  return {random.Uniform(-1e-5, 1e-5), random.Uniform(-1e-5, 1e-5), random.Uniform(-1e-5, 1e-5)};
 }
 
 TEST(RelativePoseResidualTest, SquaresToTheMahalanobisDistanceOfACorrelatedCovariance) {
@@ -55,14 +63,12 @@ TEST(RelativePoseResidualTest, SquaresToTheMahalanobisDistanceOfACorrelatedCovar
     const Pose2 X_WA = random.Pose();
     const Pose2 X_AB = random.Pose();
     const Eigen::Matrix3d covariance = CorrelatedCovariance(random);
-    // Small, so that the perturbation's tangent and its translation are the same to first order.
-    const Eigen::Vector3d perturbation(
-        random.Uniform(-1e-5, 1e-5), random.Uniform(-1e-5, 1e-5), random.Uniform(-1e-5, 1e-5));
+    const Eigen::Vector3d perturbation = SmallPerturbation(random);
     const Pose2 X_WB = X_WA * X_AB * Pose2::Exp(perturbation);
-    const Eigen::Vector3d value =
-        Evaluate<3>(RelativePoseResidual(X_AB, covariance), Block(X_WA), Block(X_WB));
     const double expected = SquaredMahalanobis(perturbation, covariance);
-    EXPECT_NEAR(value.squaredNorm(), expected, 1e-4 * expected + 1e-16);
+    EXPECT_NEAR(SquaredNorm(RelativePoseResidual(X_AB, covariance), Block(X_WA), Block(X_WB)),
+                expected,
+                1e-4 * expected + 1e-16);
   }
 }
 
@@ -72,55 +78,74 @@ TEST(AbsolutePoseResidualTest, SquaresToTheMahalanobisDistanceOfACorrelatedCovar
     const Pose2 X_WM = random.Pose();
     const Pose2 X_KF = random.Pose();
     const Eigen::Matrix3d covariance = CorrelatedCovariance(random);
-    const Eigen::Vector3d perturbation(
-        random.Uniform(-1e-5, 1e-5), random.Uniform(-1e-5, 1e-5), random.Uniform(-1e-5, 1e-5));
+    const Eigen::Vector3d perturbation = SmallPerturbation(random);
     const Pose2 X_WK = X_WM * Pose2::Exp(perturbation) * X_KF.Inverse();
-    const Eigen::Vector3d value =
-        Evaluate<3>(AbsolutePoseResidual(X_WM, X_KF, covariance), Block(X_WK, 1));
     const double expected = SquaredMahalanobis(perturbation, covariance);
-    EXPECT_NEAR(value.squaredNorm(), expected, 1e-4 * expected + 1e-16);
+    EXPECT_NEAR(SquaredNorm(AbsolutePoseResidual::OfPose(X_WM, X_KF, covariance), Block(X_WK, 1)),
+                expected,
+                1e-4 * expected + 1e-16);
   }
 }
 
-TEST(AbsolutePositionResidualTest, WeighsAlongTheMapsAxes) {
+TEST(AbsolutePoseResidualTest, OfAPositionWeighsAlongTheMapsAxesAndNoHeading) {
   const Eigen::Matrix2d covariance = Eigen::Vector2d(4.0, 0.25).asDiagonal();
-  const AbsolutePositionResidual residual({10.0, 20.0}, {1.0, 0.0}, covariance);
+  const auto residual =
+      AbsolutePoseResidual::OfPosition({10.0, 20.0}, Pose2(1.0, 0.0, 0.0), covariance);
   // K at (12, 19) looks along +y: F is at (12, 20), 2 m from the measurement along x.
   const Pose2 X_WK(12.0, 19.0, std::numbers::pi / 2.0);
-  EXPECT_THAT(Evaluate<2>(residual, Block(X_WK)), IsNear(Eigen::Vector2d(1.0, 0.0), 1e-12));
+  EXPECT_NEAR(SquaredNorm(residual, Block(X_WK)), 1.0, 1e-12);
 }
 
-/// The Jacobians that Ceres sees agree with central differences.
-TEST(ResidualsTest, DerivativesAgreeWithDifferences) {
+constexpr double kStep = 1e-6;
+
+/// Central differences of a function of a pose.
+template <typename Function>
+Eigen::Matrix3d Differences(const Eigen::Vector3d& x, Function function) {
+  Eigen::Matrix3d result;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(i);
+    result.col(i) = (function(x + step) - function(x - step)) / (2.0 * kStep);
+  }
+  return result;
+}
+
+TEST(RelativePoseResidualTest, DerivativesAgreeWithDifferences) {
   TestRandom random(4);
-  constexpr double kStep = 1e-6;
   for (int trial = 0; trial < kTrials; ++trial) {
-    const RelativePoseResidual::CostFunction cost(
-        new RelativePoseResidual(random.Pose(), CorrelatedCovariance(random)));
-    Eigen::Matrix<double, 6, 1> x;
-    x << Block(random.Pose()), Block(random.Pose());
-    const std::array<const double*, 2> blocks{x.data(), x.data() + 3};
-    Eigen::Vector3d value;
-    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_A;
-    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> by_B;
-    std::array<double*, 2> jacobians{by_A.data(), by_B.data()};
-    ASSERT_TRUE(cost.Evaluate(blocks.data(), value.data(), jacobians.data()));
-    if (std::abs(value.z()) > 0.9 * std::numbers::pi) continue;  // the angle wraps in between
-    for (int i = 0; i < 6; ++i) {
-      const double kept = x(i);
-      Eigen::Vector3d above;
-      Eigen::Vector3d below;
-      x(i) = kept + kStep;
-      ASSERT_TRUE(cost.Evaluate(blocks.data(), above.data(), nullptr));
-      x(i) = kept - kStep;
-      ASSERT_TRUE(cost.Evaluate(blocks.data(), below.data(), nullptr));
-      x(i) = kept;
-      const Eigen::Vector3d expected = (above - below) / (2.0 * kStep);
-      const Eigen::Vector3d column = i < 3 ? by_A.col(i) : by_B.col(i - 3);
-      const double jump = (above - below).norm();
-      if (jump > 1.0) continue;  // across the wrap
-      EXPECT_THAT(column, IsNear(expected, 1e-5 * (1.0 + expected.norm())));
-    }
+    const RelativePoseResidual residual(random.Pose(), CorrelatedCovariance(random));
+    const Eigen::Vector3d x_WA = Block(random.Pose());
+    const Eigen::Vector3d x_WB = Block(random.Pose());
+    const auto at = residual.Linearize(x_WA, x_WB);
+    if (std::abs(at.error.z()) > 0.99 * std::numbers::pi) continue;  // wraps in between
+    const double tolerance = 1e-6 * (1.0 + (x_WB - x_WA).norm());
+    EXPECT_THAT(at.by_A,
+                IsNear(Differences(x_WA,
+                                   [&](const Eigen::Vector3d& x) {
+                                     return residual.Linearize(x, x_WB).error;
+                                   }),
+                       tolerance));
+    EXPECT_THAT(at.by_B,
+                IsNear(Differences(x_WB,
+                                   [&](const Eigen::Vector3d& x) {
+                                     return residual.Linearize(x_WA, x).error;
+                                   }),
+                       tolerance));
+  }
+}
+
+TEST(AbsolutePoseResidualTest, DerivativesAgreeWithDifferences) {
+  TestRandom random(5);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const auto residual =
+        AbsolutePoseResidual::OfPose(random.Pose(), random.Pose(), CorrelatedCovariance(random));
+    const Eigen::Vector3d x_WK = Block(random.Pose());
+    const auto at = residual.Linearize(x_WK);
+    if (std::abs(at.error.z()) > 0.99 * std::numbers::pi) continue;  // wraps in between
+    EXPECT_THAT(
+        at.by_K,
+        IsNear(Differences(x_WK,
+                           [&](const Eigen::Vector3d& x) { return residual.Linearize(x).error; }),
+               1e-4));
   }
 }
 

@@ -1,0 +1,164 @@
+#include "smoothing/batch_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/sized_cost_function.h>
+#include <ceres/solver.h>
+
+#include "geometry/angle.h"
+
+namespace relocd {
+namespace {
+
+using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// A relative pose's residual, as Ceres wants it: with unit variances.
+class MotionCost final : public ceres::SizedCostFunction<3, 3, 3> {
+ public:
+  explicit MotionCost(const RelativePoseResidual& residual)
+      : residual_(residual), weight_(residual.covariance().inverse().llt().matrixU()) {}
+
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const auto at = residual_.Linearize(Eigen::Map<const Eigen::Vector3d>(x[0]),
+                                        Eigen::Map<const Eigen::Vector3d>(x[1]));
+    Eigen::Map<Eigen::Vector3d> weighted(residual);
+    weighted = weight_ * at.error;
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) Eigen::Map<RowMajor3>{jacobians[0]} = weight_ * at.by_A;
+    if (jacobians[1] != nullptr) Eigen::Map<RowMajor3>{jacobians[1]} = weight_ * at.by_B;
+    return true;
+  }
+
+ private:
+  RelativePoseResidual residual_;
+  Eigen::Matrix3d weight_;
+};
+
+/// An absolute pose's residual, likewise.
+class FixCost final : public ceres::SizedCostFunction<3, 3> {
+ public:
+  explicit FixCost(const AbsolutePoseResidual& residual) : residual_(residual) {
+    // Not a Cholesky factor: without a heading the information is singular.
+    const Eigen::LDLT<Eigen::Matrix3d> factor(residual.information());
+    const Eigen::Matrix3d upper = factor.matrixU();
+    const Eigen::Vector3d roots = factor.vectorD().cwiseMax(0.0).cwiseSqrt();
+    weight_ = roots.asDiagonal() * upper *
+              Eigen::Matrix3d(factor.transpositionsP() * Eigen::Matrix3d::Identity());
+  }
+
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const auto at = residual_.Linearize(Eigen::Map<const Eigen::Vector3d>(x[0]));
+    Eigen::Map<Eigen::Vector3d> weighted(residual);
+    weighted = weight_ * at.error;
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      Eigen::Map<RowMajor3>{jacobians[0]} = weight_ * at.by_K;
+    }
+    return true;
+  }
+
+ private:
+  AbsolutePoseResidual residual_;
+  Eigen::Matrix3d weight_;
+};
+
+ceres::Solver::Options SolverOptions(int max_iterations, double trust_region_radius) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;  // no BLAS, so no threads
+  options.num_threads = 1;
+  options.max_num_iterations = max_iterations;
+  options.initial_trust_region_radius = trust_region_radius;
+  options.max_trust_region_radius = std::max(options.max_trust_region_radius, trust_region_radius);
+  // The default of 1e-6 stops short: a rigid shift of the whole chain lowers the cost slowly.
+  options.function_tolerance = 1e-9;
+  options.parameter_tolerance = 1e-10;
+  options.max_solver_time_in_seconds = 1e6;  // a limit by the clock would end the bit equality
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
+ceres::Problem::Options ProblemOptions() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.disable_all_safety_checks = true;
+  return options;
+}
+
+/// Ceres's problem over a window, which it borrows.
+class WindowProblem {
+ public:
+  WindowProblem(KeyframeWindow& window, const FixWeighting& weighting)
+      : cauchy_(weighting.cauchy_scale_sigmas()), problem_(ProblemOptions()) {
+    Keyframe& oldest = window.keyframes.front();
+    const PlanarPose prior = window.prior.value_or(
+        PlanarPose{.X_WB = oldest.X_WK(), .covariance = kUnknownSigmas.cwiseAbs2().asDiagonal()});
+    AddFix(AbsolutePoseResidual::OfPose(prior.X_WB, Pose2(), prior.covariance), nullptr, oldest);
+    for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
+      problem_.AddResidualBlock(new MotionCost(window.keyframes[i].MotionResidual()),
+                                nullptr,
+                                window.keyframes[i - 1].x_WK.data(),
+                                window.keyframes[i].x_WK.data());
+    }
+    losses_.reserve(window.fixes.size());
+    for (const AttachedFix& fix : window.fixes) {
+      if (fix.share <= 0.0) continue;
+      losses_.push_back(std::make_unique<ceres::ScaledLoss>(
+          &cauchy_, weighting.BaseWeight(fix) / weighting.misfit(), ceres::DO_NOT_TAKE_OWNERSHIP));
+      AddFix(fix.residual, losses_.back().get(), window.Get(fix.keyframe_id));
+    }
+  }
+
+  /// @return whether the result is finite and no worse than before.
+  bool Solve(int max_iterations) {
+    // With the default radius of 1e4 a rigid shift of the chain is damped: a few iterations then
+    // stop metres short of the minimum.
+    constexpr double kUndamped = 1e16;
+    ceres::Solver::Summary summary;
+    ceres::Solve(SolverOptions(max_iterations, kUndamped), &problem_, &summary);
+    if (summary.IsSolutionUsable() && summary.termination_type != ceres::CONVERGENCE &&
+        summary.num_successful_steps <= 1 && summary.num_unsuccessful_steps > 0) {
+      // No whole Gauss-Newton step lowers the cost: short ones do.
+      constexpr double kDamped = 1e4;
+      ceres::Solve(SolverOptions(3 * max_iterations, kDamped), &problem_, &summary);
+    }
+    return summary.IsSolutionUsable() && std::isfinite(summary.final_cost);
+  }
+
+ private:
+  void AddFix(const AbsolutePoseResidual& residual, ceres::LossFunction* loss, Keyframe& keyframe) {
+    problem_.AddResidualBlock(new FixCost(residual), loss, keyframe.x_WK.data());
+  }
+
+  ceres::CauchyLoss cauchy_;
+  std::vector<std::unique_ptr<ceres::ScaledLoss>> losses_;
+  ceres::Problem problem_;
+};
+
+}  // namespace
+
+bool SolveBatch(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations) {
+  std::vector<Eigen::Vector3d> before;
+  before.reserve(window.keyframes.size());
+  for (const Keyframe& keyframe : window.keyframes)
+    before.push_back(keyframe.x_WK);
+
+  bool usable = WindowProblem(window, weighting).Solve(max_iterations);
+  for (Keyframe& keyframe : window.keyframes) {
+    usable = usable && keyframe.x_WK.allFinite();
+    keyframe.x_WK.z() = WrapAngle(keyframe.x_WK.z());
+  }
+  if (usable) return true;
+  for (std::size_t i = 0; i < before.size(); ++i)
+    window.keyframes[i].x_WK = before[i];
+  return false;
+}
+
+}  // namespace relocd

@@ -1,0 +1,377 @@
+#include "smoothing/chain_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "core/check.h"
+#include "geometry/angle.h"
+
+namespace relocd {
+namespace {
+
+/// A keyframe that turned by more has its motion linearised anew: what is then neglected is the
+/// motion's length times half the square of it.
+constexpr double kLinearTurn = 1e-3;
+/// A keyframe that moved by this part of a fix's sigma has its fixes weighted anew.
+constexpr double kLinearShare = 0.01;
+/// Poses that would move by less are left, and all before them.
+constexpr double kLeastLength = 2e-5;
+constexpr double kLeastTurn = 2e-6;
+/// An iteration that moved by less was the last one.
+constexpr double kSettledLength = 1e-4;
+constexpr double kSettledTurn = 1e-5;
+/// A step that turns a keyframe by more is looked at: has it lowered the cost?
+constexpr double kDoubtfulTurn = 0.1;
+/// Information with which a damped step holds the estimates, of 1 m and 0.1 rad.
+const Eigen::Vector3d kDampingInformation(1.0, 1.0, 100.0);
+
+Eigen::Matrix3d Symmetric(const Eigen::Matrix3d& matrix) {
+  return 0.5 * (matrix + matrix.transpose());
+}
+
+/// The rotation by `yaw` of a planar tangent (x, y, yaw).
+Eigen::Matrix3d TangentRotation(double yaw) {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  rotation.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(yaw).toRotationMatrix();
+  return rotation;
+}
+
+/// A covariance along W's axes, of one along those of a body that looks to `yaw`.
+Eigen::Matrix3d AlongMap(const Eigen::Matrix3d& covariance, double yaw) {
+  const Eigen::Matrix3d rotation = TangentRotation(yaw);
+  return Symmetric(rotation * covariance * rotation.transpose());
+}
+
+}  // namespace
+
+ChainSolver::ChainSolver(std::size_t capacity) : nodes_(capacity) {}
+
+void ChainSolver::Invalidate() {
+  nodes_.clear();
+  first_dirty_ = 0;
+}
+
+void ChainSolver::FixesChanged(std::int64_t first_id, std::int64_t last_id) {
+  if (nodes_.empty()) return;  // nodes are new when they are made
+  const std::int64_t oldest = nodes_.front().id;
+  for (std::int64_t id = std::max(first_id, oldest); id <= std::min(last_id, nodes_.back().id);
+       ++id)
+    nodes_[static_cast<std::size_t>(id - oldest)].are_fixes_new = true;
+}
+
+void ChainSolver::Synchronize(const KeyframeWindow& window) {
+  while (!nodes_.empty() && nodes_.front().id < window.keyframes.front().id) {
+    nodes_.pop_front();
+    if (first_dirty_ > 0) --first_dirty_;
+  }
+  for (std::size_t i = nodes_.size(); i < window.keyframes.size(); ++i) {
+    const Keyframe& keyframe = window.keyframes[i];
+    Node node;
+    node.id = keyframe.id;
+    node.reference = keyframe.x_WK;
+    node.residual = keyframe.MotionResidual();
+    nodes_.push_back(node);
+    first_dirty_ = std::min(first_dirty_, i);
+  }
+  RELOCD_CHECK(
+      nodes_.size() == window.keyframes.size() && nodes_.front().id == window.keyframes.front().id,
+      "the window was changed, and the solver not told");
+}
+
+void ChainSolver::Linearize(KeyframeWindow& window, const FixWeighting& weighting) {
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    Node& node = nodes_[i];
+    bool is_changed = false;
+    if (i > 0) {
+      const double yaw = nodes_[i - 1].reference.z() + nodes_[i - 1].delta.z();
+      if (node.is_motion_new || std::abs(yaw - node.motion_yaw) > kLinearTurn) {
+        LinearizeMotion(i);
+        is_changed = true;
+      }
+    }
+    if (node.has_fixes && !node.are_fixes_new) {
+      const Eigen::Vector3d moved = node.estimate() - node.weighted_at;
+      const double squared = node.largest_information_m * moved.head<2>().squaredNorm() +
+                             node.largest_information_rad * moved.z() * moved.z();
+      node.are_fixes_new = squared > kLinearShare * kLinearShare;
+    }
+    if (node.are_fixes_new) {
+      LinearizeFixes(window, weighting, node);
+      is_changed = true;
+    }
+    if (is_changed) first_dirty_ = std::min(first_dirty_, i);
+  }
+}
+
+void ChainSolver::LinearizeMotion(std::size_t i) {
+  const Node& before = nodes_[i - 1];
+  Node& node = nodes_[i];
+  node.motion = node.residual.Linearize(before.estimate(), node.estimate());
+  node.motion.error -= node.motion.by_A * before.delta + node.motion.by_B * node.delta;
+  node.motion_yaw = before.estimate().z();
+  node.is_motion_new = false;
+}
+
+void ChainSolver::LinearizeFixes(KeyframeWindow& window,
+                                 const FixWeighting& weighting,
+                                 Node& node) {
+  node.information.setZero();
+  node.rhs.setZero();
+  node.largest_information_m = 0.0;
+  node.largest_information_rad = 0.0;
+  node.weighted_at = node.estimate();
+  node.are_fixes_new = false;
+  node.has_fixes = false;
+  for (AttachedFix* fix = window.FirstFix(node.id);
+       fix != window.fixes.end() && fix->keyframe_id == node.id;
+       ++fix) {
+    if (fix->share <= 0.0) continue;
+    const AbsolutePoseResidual::Linearization at = fix->residual.Linearize(node.weighted_at);
+    const Eigen::Matrix3d& information = fix->residual.information();
+    const double squared = at.error.dot(information * at.error);
+    const double weight = weighting.BaseWeight(*fix) * weighting.KernelWeight(squared);
+    const Eigen::Matrix3d gradient = weight * at.by_K.transpose() * information;
+    node.information += gradient * at.by_K;
+    node.rhs -= gradient * (at.error - at.by_K * node.delta);
+    node.largest_information_m =
+        std::max({node.largest_information_m, information(0, 0), information(1, 1)});
+    node.largest_information_rad = std::max(node.largest_information_rad, information(2, 2));
+    node.has_fixes = true;
+  }
+}
+
+ChainSolver::Prediction ChainSolver::FromPrior(const KeyframeWindow& window) const {
+  if (!window.prior) {
+    return {Eigen::Vector3d::Zero(), kUnknownSigmas.cwiseAbs2().asDiagonal()};
+  }
+  const Pose2& X_WM = window.prior->X_WB;
+  const Eigen::Vector3d& reference = nodes_.front().reference;
+  Eigen::Vector3d mean;
+  mean << X_WM.translation() - reference.head<2>(), WrapAngle(X_WM.yaw() - reference.z());
+  return {mean, AlongMap(window.prior->covariance, X_WM.yaw())};
+}
+
+ChainSolver::Prediction ChainSolver::Predict(std::size_t i) {
+  Node& before = nodes_[i - 1];
+  const Node& node = nodes_[i];
+  // by_A * delta_before + by_B * delta + error is zero but for the motion's noise.
+  const Eigen::Matrix3d cross = before.covariance * node.motion.by_A.transpose();
+  const Eigen::Matrix3d innovation =
+      Symmetric(node.residual.covariance() + node.motion.by_A * cross);
+  const Eigen::Vector3d error = node.motion.error + node.motion.by_A * before.mean;
+  const Eigen::Matrix3d gain = cross * innovation.inverse();
+  before.gain = gain * node.motion.by_B;
+  before.offset = before.mean - gain * error;
+  // by_B is a rotation: its transpose is its inverse.
+  return {-(node.motion.by_B.transpose() * error),
+          Symmetric(node.motion.by_B.transpose() * innovation * node.motion.by_B)};
+}
+
+void ChainSolver::Correct(const Prediction& predicted, double misfit, double damping, Node& node) {
+  if (!node.has_fixes && damping <= 0.0) {
+    node.mean = predicted.mean;
+    node.covariance = predicted.covariance;
+    return;
+  }
+  Eigen::Matrix3d information = node.information / misfit;
+  Eigen::Vector3d rhs = node.rhs / misfit;
+  if (damping > 0.0) {
+    const Eigen::Vector3d hold = damping * kDampingInformation;
+    information.diagonal() += hold;
+    rhs += hold.cwiseProduct(node.delta);
+  }
+  const Eigen::Matrix3d inverse =
+      (Eigen::Matrix3d::Identity() + predicted.covariance * information).inverse();
+  node.mean = inverse * (predicted.mean + predicted.covariance * rhs);
+  node.covariance = Symmetric(inverse * predicted.covariance);
+}
+
+void ChainSolver::Eliminate(const KeyframeWindow& window,
+                            double misfit,
+                            double damping,
+                            std::size_t end) {
+  for (std::size_t i = first_dirty_; i < end; ++i) {
+    Correct(i == 0 ? FromPrior(window) : Predict(i), misfit, damping, nodes_[i]);
+  }
+  first_dirty_ = std::max(first_dirty_, end);
+}
+
+ChainSolver::Step ChainSolver::Substitute(std::size_t first_new) {
+  Step step;
+  for (std::size_t i = nodes_.size(); i-- > 0;) {
+    Node& node = nodes_[i];
+    const bool is_newest = i + 1 == nodes_.size();
+    Eigen::Vector3d delta = node.mean;
+    if (!is_newest) {
+      const Eigen::Vector3d& after = nodes_[i + 1].delta;
+      const Eigen::Vector3d moved = after - node.delta_after;
+      if (i < first_new && moved.head<2>().lpNorm<Eigen::Infinity>() < kLeastLength &&
+          std::abs(moved.z()) < kLeastTurn) {
+        break;
+      }
+      node.delta_after = after;
+      delta = node.offset - node.gain * after;
+    }
+    const Eigen::Vector3d change = delta - node.delta;
+    step.length_m = std::max(step.length_m, change.head<2>().lpNorm<Eigen::Infinity>());
+    step.turn_rad = std::max(step.turn_rad, std::abs(change.z()));
+    node.delta = delta;
+  }
+  return step;
+}
+
+void ChainSolver::WriteEstimates(KeyframeWindow& window) const {
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    window.keyframes[i].x_WK = nodes_[i].estimate();
+}
+
+void ChainSolver::RestoreDeltas() {
+  for (Node& node : nodes_)
+    node.delta = node.delta_before_step;
+}
+
+bool ChainSolver::AreFinite() const {
+  return nodes_.back().covariance.allFinite() &&
+         std::all_of(
+             nodes_.begin(), nodes_.end(), [](const Node& node) { return node.delta.allFinite(); });
+}
+
+double ChainSolver::Cost(KeyframeWindow& window, const FixWeighting& weighting) const {
+  const Prediction prior = FromPrior(window);
+  const Eigen::Vector3d error = nodes_.front().delta - prior.mean;
+  double cost = error.dot(prior.covariance.inverse() * error);
+  for (std::size_t i = 1; i < nodes_.size(); ++i) {
+    const Eigen::Vector3d motion =
+        nodes_[i].residual.Linearize(nodes_[i - 1].estimate(), nodes_[i].estimate()).error;
+    cost += motion.dot(nodes_[i].residual.covariance().inverse() * motion);
+  }
+  const double scale = weighting.cauchy_scale_sigmas() * weighting.cauchy_scale_sigmas();
+  for (const AttachedFix& fix : window.fixes) {
+    const Node& node = nodes_[static_cast<std::size_t>(fix.keyframe_id - nodes_.front().id)];
+    const Eigen::Vector3d at = fix.residual.Linearize(node.estimate()).error;
+    const double squared = at.dot(fix.residual.information() * at);
+    cost += weighting.BaseWeight(fix) / weighting.misfit() * scale * std::log1p(squared / scale);
+  }
+  return cost;
+}
+
+bool ChainSolver::IterateUndamped(KeyframeWindow& window,
+                                  const FixWeighting& weighting,
+                                  int max_iterations) {
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    Linearize(window, weighting);
+    if (first_dirty_ >= nodes_.size()) return true;
+    const std::size_t first_new = first_dirty_;
+    Eliminate(window, weighting.misfit(), 0.0, nodes_.size());
+    for (Node& node : nodes_)
+      node.delta_before_step = node.delta;
+    const Step step = Substitute(first_new);
+    if (!AreFinite()) return false;
+    if (step.turn_rad > kDoubtfulTurn) {
+      const double after = Cost(window, weighting);
+      for (Node& node : nodes_)
+        node.delta.swap(node.delta_before_step);
+      const double before = Cost(window, weighting);
+      if (!(after <= before)) return IterateDamped(window, weighting, 3 * max_iterations);
+      for (Node& node : nodes_)
+        node.delta.swap(node.delta_before_step);
+    }
+    if (step.length_m < kSettledLength && step.turn_rad < kSettledTurn) return true;
+  }
+  return true;
+}
+
+bool ChainSolver::IterateDamped(KeyframeWindow& window,
+                                const FixWeighting& weighting,
+                                int max_iterations) {
+  constexpr double kFactor = 10.0;
+  constexpr double kMostDamping = 1e8;
+  double damping = 1.0;
+  double cost = Cost(window, weighting);
+  for (int iteration = 0; iteration < max_iterations && damping < kMostDamping;) {
+    for (Node& node : nodes_) {
+      node.is_motion_new = true;
+      node.are_fixes_new = true;
+      node.delta_before_step = node.delta;
+    }
+    Linearize(window, weighting);
+    first_dirty_ = 0;
+    Eliminate(window, weighting.misfit(), damping, nodes_.size());
+    const Step step = Substitute(nodes_.size());
+    const double after = AreFinite() ? Cost(window, weighting) : cost;
+    const bool is_lower = after < cost;
+    if (is_lower) {
+      cost = after;
+      damping /= kFactor;
+      ++iteration;
+      if (step.length_m < kSettledLength && step.turn_rad < kSettledTurn) break;
+    } else {
+      RestoreDeltas();
+      damping *= kFactor;
+    }
+  }
+  // The covariances without the damping, at the estimates that were reached.
+  Linearize(window, weighting);
+  first_dirty_ = 0;
+  Eliminate(window, weighting.misfit(), 0.0, nodes_.size());
+  first_dirty_ = 0;  // the estimates are not those of this elimination
+  return AreFinite();
+}
+
+bool ChainSolver::Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations) {
+  Synchronize(window);
+  if (weighting.misfit() != misfit_) {
+    misfit_ = weighting.misfit();
+    first_dirty_ = 0;
+  }
+  if (!IterateUndamped(window, weighting, max_iterations)) {
+    Invalidate();
+    return false;
+  }
+  WriteEstimates(window);
+  return true;
+}
+
+Eigen::Matrix3d ChainSolver::NewestCovariance() const {
+  const Node& newest = nodes_.back();
+  return AlongMap(newest.covariance, -(newest.reference.z() + newest.delta.z()));
+}
+
+void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting) {
+  RELOCD_CHECK(window.keyframes.size() > 1, "the newest keyframe must stay");
+  Synchronize(window);
+  if (nodes_[0].are_fixes_new) LinearizeFixes(window, weighting, nodes_[0]);
+  if (nodes_[1].is_motion_new) LinearizeMotion(1);
+  if (first_dirty_ == 0) Eliminate(window, weighting.misfit(), 0.0, 1);
+  const Prediction next = Predict(1);
+  const Eigen::Vector3d x_WM = nodes_[1].reference + next.mean;
+  window.prior = PlanarPose{.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
+                            .covariance = AlongMap(next.covariance, -x_WM.z())};
+  window.PopFront();
+}
+
+std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& window,
+                                                              const FixWeighting& weighting) {
+  Invalidate();
+  Synchronize(window);
+  Linearize(window, weighting);
+  Eliminate(window, weighting.misfit(), 0.0, nodes_.size());
+  // Rauch, Tung and Striebel (1965), backwards.
+  std::vector<Eigen::Matrix3d> smoothed(nodes_.size());
+  smoothed.back() = nodes_.back().covariance;
+  for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
+    const Prediction predicted = Predict(i + 1);
+    const Eigen::Matrix3d& gain = nodes_[i].gain;
+    smoothed[i] = Symmetric(nodes_[i].covariance +
+                            gain * (smoothed[i + 1] - predicted.covariance) * gain.transpose());
+  }
+  for (std::size_t i = 0; i < smoothed.size(); ++i)
+    smoothed[i] = AlongMap(smoothed[i], -nodes_[i].reference.z());
+  return smoothed;
+}
+
+}  // namespace relocd

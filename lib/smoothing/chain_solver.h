@@ -1,0 +1,129 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "geometry/planar.h"
+#include "smoothing/keyframe_window.h"
+#include "smoothing/relative_pose_residual.h"
+#include "smoothing/sliding_vector.h"
+
+namespace relocd {
+
+/// Finds the most likely poses of a window's keyframes, again and again as the window grows, and
+/// does only what has changed.
+///
+/// The keyframes are a chain, so the normal equations are block-tridiagonal, and are eliminated
+/// from the oldest keyframe on: a filter in blocks of 3x3, whose state at each keyframe is kept. A
+/// new fix on the newest keyframe costs one step of it. Then the poses are taken back to front, and
+/// no further than they move. What is linearised anew is the motion from a keyframe that has turned
+/// (a shift changes nothing, since the residuals are linear in it), and the fixes of one that has
+/// moved by a hundredth of their sigma, whose weights under the kernel change.
+///
+/// Covariances are carried instead of information: a vague prior next to a stiff chain loses no
+/// digits. Allocates nothing once it has seen its largest window. Thread-bound.
+class ChainSolver {
+ public:
+  /// @param capacity  the most keyframes that there will be without an allocation.
+  explicit ChainSolver(std::size_t capacity);
+
+  /// All is to be linearised anew: the estimates were changed by somebody else.
+  void Invalidate();
+  /// The fixes of these keyframes, or their shares, have changed.
+  void FixesChanged(std::int64_t first_id, std::int64_t last_id);
+
+  /// Moves the window's estimates to the minimum, nearer by at most `max_iterations` steps. The
+  /// shares of the fixes must be set.
+  ///
+  /// Gauss and Newton's step; where that would turn a keyframe far and not lower the cost, damped
+  /// ones. The same calls give the same bits.
+  ///
+  /// @return whether the estimates are finite; if not, they are as before.
+  bool Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
+
+  /// The covariance of the newest keyframe's right perturbation given all in the window, as of the
+  /// last Solve: the last block of the elimination.
+  [[nodiscard]] Eigen::Matrix3d NewestCovariance() const;
+
+  /// Takes the oldest keyframe and its fixes out of the window, and leaves what they say of the
+  /// next one as its prior. The window must have two keyframes.
+  void MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting);
+
+  /// The covariances of all keyframes' right perturbations given all in the window, at the window's
+  /// estimates.
+  std::vector<Eigen::Matrix3d> SmoothedCovariances(KeyframeWindow& window,
+                                                   const FixWeighting& weighting);
+
+ private:
+  /// A keyframe's part of the equations. Its estimate is reference + delta.
+  struct Node {
+    std::int64_t id = 0;
+    Eigen::Vector3d reference = Eigen::Vector3d::Zero();
+    Eigen::Vector3d delta = Eigen::Vector3d::Zero();
+
+    /// The motion from the node before, whose error at all deltas zero is `motion.error`.
+    RelativePoseResidual residual;
+    RelativePoseResidual::Linearization motion;
+    double motion_yaw = 0.0;  ///< Of the node before, where it is linearised.
+
+    /// The fixes: information * delta = rhs, without the misfit.
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
+    Eigen::Vector3d weighted_at = Eigen::Vector3d::Zero();
+    double largest_information_m = 0.0;
+    double largest_information_rad = 0.0;
+    bool has_fixes = false;
+    bool is_motion_new = true;
+    bool are_fixes_new = true;
+
+    /// What is known of the delta from here and before.
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    /// delta = offset - gain * delta of the node after, for which it was last taken.
+    Eigen::Matrix3d gain = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    Eigen::Vector3d delta_after = Eigen::Vector3d::Zero();
+    Eigen::Vector3d delta_before_step = Eigen::Vector3d::Zero();
+
+    [[nodiscard]] Eigen::Vector3d estimate() const { return reference + delta; }
+  };
+
+  struct Prediction {
+    Eigen::Vector3d mean;
+    Eigen::Matrix3d covariance;
+  };
+
+  /// The largest changes of one step.
+  struct Step {
+    double length_m = 0.0;
+    double turn_rad = 0.0;
+  };
+
+  void Synchronize(const KeyframeWindow& window);
+  void Linearize(KeyframeWindow& window, const FixWeighting& weighting);
+  void LinearizeMotion(std::size_t i);
+  void LinearizeFixes(KeyframeWindow& window, const FixWeighting& weighting, Node& node);
+
+  [[nodiscard]] Prediction FromPrior(const KeyframeWindow& window) const;
+  /// What the node before says of node i; keeps in it what leads back.
+  Prediction Predict(std::size_t i);
+  void Correct(const Prediction& predicted, double misfit, double damping, Node& node);
+  void Eliminate(const KeyframeWindow& window, double misfit, double damping, std::size_t end);
+  Step Substitute(std::size_t first_new);
+  void WriteEstimates(KeyframeWindow& window) const;
+
+  bool IterateUndamped(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
+  bool IterateDamped(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
+  void RestoreDeltas();
+  [[nodiscard]] double Cost(KeyframeWindow& window, const FixWeighting& weighting) const;
+  [[nodiscard]] bool AreFinite() const;
+
+  SlidingVector<Node> nodes_;
+  std::size_t first_dirty_ = 0;  ///< From here on the elimination is to be done again.
+  double misfit_ = 0.0;          ///< Of the elimination.
+};
+
+}  // namespace relocd

@@ -1,0 +1,68 @@
+#include "smoothing/fix_misfit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+namespace relocd {
+namespace {
+
+constexpr double kReach = 10.0;  // s; errors were seen to last 3 to 8 s
+constexpr double kUsualMisfit = 8.0;
+constexpr double kUsualWeight = 10.0;  // in fixes
+
+Eigen::Vector2d WhitenedError(const KeyframeWindow& window, const AttachedFix& fix) {
+  const Eigen::Vector3d& x_WK =
+      window.keyframes[static_cast<std::size_t>(fix.keyframe_id - window.keyframes.front().id)]
+          .x_WK;
+  return fix.residual.Linearize(x_WK).error.head<2>() / fix.sigma_m;
+}
+
+}  // namespace
+
+/// By how much the fixes scatter more than their covariances say, as a variance, at least 1. From
+/// the better third of them: more than half may be wrong.
+double FixMisfit::ScatterFactor() {
+  constexpr double kQuantile = 0.3;
+  // Of the squared length of a standard normal vector in the plane.
+  const double expected = -2.0 * std::log(1.0 - kQuantile);
+  constexpr double kWeightOfOne = 10.0;  // in fixes: few of them scatter by chance
+  if (squared_.empty()) return 1.0;
+  const auto count = static_cast<double>(squared_.size());
+  const auto chosen = squared_.begin() + static_cast<std::ptrdiff_t>(kQuantile * count);
+  std::nth_element(squared_.begin(), chosen, squared_.end());
+  return std::max(1.0, (count * *chosen / expected + kWeightOfOne) / (count + kWeightOfOne));
+}
+
+double FixMisfit::Estimate(const KeyframeWindow& window, const FixWeighting& weighting) {
+  squared_.clear();
+  for (const AttachedFix& fix : window.fixes) {
+    if (!fix.is_gated) squared_.push_back(WhitenedError(window, fix).squaredNorm());
+  }
+  const double scatter_factor = ScatterFactor();
+
+  // The sum over pairs of a weight that falls exponentially, in one pass.
+  Eigen::Vector2d recent = Eigen::Vector2d::Zero();
+  double squared = 0.0;
+  double shares = 0.0;
+  MonotonicTime last{};
+  for (const AttachedFix& fix : window.fixes) {
+    if (fix.share <= 0.0) continue;
+    const Eigen::Vector2d whitened = WhitenedError(window, fix) / std::sqrt(scatter_factor);
+    const Eigen::Vector2d pull =
+        fix.share * weighting.KernelWeight(whitened.squaredNorm()) * whitened;
+    recent *= std::exp(-ToSeconds(fix.fix.time - last) / kReach);
+    squared += pull.squaredNorm() + 2.0 * pull.dot(recent);
+    recent += pull;
+    shares += fix.share;
+    last = fix.fix.time;
+  }
+  const double misfit = (squared / weighting.ExpectedSquaredPull() + kUsualWeight * kUsualMisfit) /
+                        (shares + kUsualWeight);
+  return scatter_factor * std::max(1.0, misfit);
+}
+
+}  // namespace relocd

@@ -1,0 +1,259 @@
+#include "smoothing/chain_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iostream>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smoothing/batch_solver.h"
+#include "smoothing/bent_window.h"
+#include "support/eigen_matchers.h"
+#include "support/random.h"
+
+namespace relocd {
+namespace {
+
+/// So wide a kernel is none: the problem is one of least squares.
+const FixWeighting kQuadratic(1e6, 0.0);
+const FixWeighting kRobust(1.0, 0.0);
+
+double LargestDifference(const KeyframeWindow& a, const KeyframeWindow& b) {
+  double largest = 0.0;
+  for (const Keyframe& keyframe : a.keyframes) {
+    const Eigen::Vector2d difference =
+        keyframe.X_WK().translation() - b.Get(keyframe.id).X_WK().translation();
+    largest = std::max(largest, difference.norm());
+  }
+  return largest;
+}
+
+/// Grows a window keyframe by keyframe as the smoother does, and gives the solver one fix at a
+/// time, of which a share is far off.
+class GrowingWindow {
+ public:
+  GrowingWindow(double outlier_share, unsigned seed)
+      : random_(seed), outlier_share_(outlier_share), chain_(64) {}
+
+  void Grow(const FixWeighting& weighting, int max_iterations) {
+    const int id =
+        window_.keyframes.empty() ? 0 : static_cast<int>(window_.keyframes.back().id) + 1;
+    const Pose2 X_PK = Pose2::Exp({0.5, 0.0, 0.15 * std::sin(0.05 * id)});
+    X_WK_ = id == 0 ? Pose2(100.0, -20.0, 3.0) : X_WK_ * X_PK;
+    const Pose2 measured = X_PK * Error(0.015, 0.008);
+    const Pose2 start = id == 0 ? X_WK_ : window_.keyframes.back().X_WK() * measured;
+    window_.keyframes.push_back(MakeKeyframe(id, start, measured));
+    if (id % 2 == 1) return;
+    const bool is_late = id % 10 == 0 && window_.keyframes.size() > 7;
+    const std::size_t back = is_late ? 7 : 1;
+    const Keyframe& keyframe = window_.keyframes[window_.keyframes.size() - back];
+    AttachedFix fix = MakeAttachedFix(keyframe, Pose2(), id % 4 == 0);
+    const bool is_outlier = random_.Uniform(0.0, 1.0) < outlier_share_;
+    const Pose2 X_WF = truth_.empty() || back == 1 ? X_WK_ * fix.X_KF
+                                                   : truth_[truth_.size() - back + 1] * fix.X_KF;
+    fix.fix.X_WB = X_WF * (is_outlier ? Error(20.0, 1.0) : Error(0.3, 0.1));
+    PrepareResidual(fix);
+    window_.Insert(fix);
+    chain_.FixesChanged(fix.keyframe_id, UpdateShares(window_, 0.0, fix.keyframe_id));
+    EXPECT_TRUE(chain_.Solve(window_, weighting, max_iterations));
+  }
+
+  void GrowAndRemember(const FixWeighting& weighting, int max_iterations) {
+    Grow(weighting, max_iterations);
+    truth_.push_back(X_WK_);
+  }
+
+  void Shorten(std::size_t size, const FixWeighting& weighting) {
+    while (window_.keyframes.size() > size)
+      chain_.MarginalizeOldest(window_, weighting);
+  }
+
+  KeyframeWindow& window() { return window_; }
+  ChainSolver& chain() { return chain_; }
+
+ private:
+  Pose2 Error(double length, double turn) {
+    return Pose2::Exp({random_.Uniform(-length, length),
+                       random_.Uniform(-length, length),
+                       random_.Uniform(-turn, turn)});
+  }
+
+  TestRandom random_;
+  double outlier_share_;
+  ChainSolver chain_;
+  KeyframeWindow window_;
+  Pose2 X_WK_;
+  std::vector<Pose2> truth_;
+};
+
+/// The largest distance of any pose from Ceres's optimum, looked for every 20 keyframes.
+double LargestDistanceFromCeres(const FixWeighting& weighting,
+                                double outlier_share,
+                                int max_iterations,
+                                unsigned seed) {
+  GrowingWindow growing(outlier_share, seed);
+  double largest = 0.0;
+  for (int i = 0; i < 301; ++i) {
+    growing.GrowAndRemember(weighting, max_iterations);
+    if (i < 20 || i % 20 != 0) continue;
+    KeyframeWindow optimum = growing.window();
+    EXPECT_TRUE(SolveBatch(optimum, weighting, 200));
+    largest = std::max(largest, LargestDifference(growing.window(), optimum));
+  }
+  return largest;
+}
+
+TEST(ChainSolverTest, AgreesWithCeresWhenTheCostIsQuadratic) {
+  for (unsigned seed = 0; seed < 10; ++seed)
+    EXPECT_LT(LargestDistanceFromCeres(kQuadratic, 0.0, 2, seed), 2e-3) << seed;
+}
+
+/// Each fix moves its window two steps nearer to a minimum that has then moved on.
+TEST(ChainSolverTest, StaysNearCeresUnderARobustKernel) {
+  double largest = 0.0;
+  for (unsigned seed = 0; seed < 10; ++seed)
+    largest = std::max(largest, LargestDistanceFromCeres(kRobust, 0.2, 2, seed));
+  std::cout << "robust: at most " << 1e3 * largest << " mm from the optimum\n";
+  EXPECT_LT(largest, 0.2);  // an inlier errs by up to 0.3 m
+}
+
+TEST(ChainSolverTest, FindsTheRobustMinimumWhenItMayIterate) {
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    GrowingWindow growing(0.2, seed);
+    for (int i = 0; i < 200; ++i)
+      growing.GrowAndRemember(kRobust, 2);
+    growing.chain().Invalidate();
+    ASSERT_TRUE(growing.chain().Solve(growing.window(), kRobust, 100));
+    KeyframeWindow optimum = growing.window();
+    ASSERT_TRUE(SolveBatch(optimum, kRobust, 200));
+    EXPECT_LT(LargestDifference(growing.window(), optimum), 5e-3) << seed;
+  }
+}
+
+/// The normal equations of a window, set up and inverted as a whole: covariances of right
+/// perturbations.
+std::vector<Eigen::Matrix3d> DenseCovariances(KeyframeWindow& window) {
+  const auto size = static_cast<Eigen::Index>(3 * window.keyframes.size());
+  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(size, size);
+  const auto prior =
+      AbsolutePoseResidual::OfPose(window.prior->X_WB, Pose2(), window.prior->covariance);
+  hessian.topLeftCorner<3, 3>() += prior.information();
+  for (Eigen::Index i = 3; i < size; i += 3) {
+    const Keyframe& keyframe = window.keyframes[static_cast<std::size_t>(i / 3)];
+    const RelativePoseResidual residual = keyframe.MotionResidual();
+    const auto at = residual.Linearize(window.Get(keyframe.id - 1).x_WK, keyframe.x_WK);
+    Eigen::Matrix<double, 3, 6> jacobian;
+    jacobian << at.by_A, at.by_B;
+    hessian.block<6, 6>(i - 3, i - 3) +=
+        jacobian.transpose() * residual.covariance().inverse() * jacobian;
+  }
+  for (const AttachedFix& fix : window.fixes) {
+    const Eigen::Matrix3d jacobian = fix.residual.Linearize(window.Get(fix.keyframe_id).x_WK).by_K;
+    const auto i = static_cast<Eigen::Index>(3 * fix.keyframe_id);
+    hessian.block<3, 3>(i, i) +=
+        kQuadratic.BaseWeight(fix) * jacobian.transpose() * fix.residual.information() * jacobian;
+  }
+  const Eigen::MatrixXd inverse = hessian.inverse();
+  std::vector<Eigen::Matrix3d> covariances;
+  for (const Keyframe& keyframe : window.keyframes) {
+    Eigen::Matrix3d R_KW = Eigen::Matrix3d::Identity();
+    R_KW.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(-keyframe.x_WK.z()).toRotationMatrix();
+    const auto i = static_cast<Eigen::Index>(3 * keyframe.id);
+    covariances.emplace_back(R_KW * inverse.block<3, 3>(i, i) * R_KW.transpose());
+  }
+  return covariances;
+}
+
+TEST(ChainSolverTest, CovariancesAreThoseOfTheWholeNormalEquations) {
+  KeyframeWindow window = MakeBentWindow(20, 1);
+  ChainSolver chain(20);
+  ASSERT_TRUE(chain.Solve(window, kQuadratic, 50));
+  const std::vector<Eigen::Matrix3d> expected = DenseCovariances(window);
+  // The equations are set up where the last step began, or a keyframe turned by a milliradian.
+  const double tolerance = 5e-3 * expected.back().diagonal().maxCoeff();
+  EXPECT_THAT(chain.NewestCovariance(), IsNear(expected.back(), tolerance));
+  const std::vector<Eigen::Matrix3d> smoothed = chain.SmoothedCovariances(window, kQuadratic);
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_THAT(smoothed[i], IsNear(expected[i], tolerance)) << "keyframe " << i;
+}
+
+TEST(ChainSolverTest, MarginalizingChangesNeitherEstimateNorCovariance) {
+  KeyframeWindow whole = MakeBentWindow(30, 2);
+  KeyframeWindow shortened = MakeBentWindow(30, 2);
+  ChainSolver chain(30);
+  ChainSolver other(30);
+  ASSERT_TRUE(chain.Solve(whole, kQuadratic, 50));
+  ASSERT_TRUE(other.Solve(shortened, kQuadratic, 50));
+  for (int i = 0; i < 20; ++i)
+    other.MarginalizeOldest(shortened, kQuadratic);
+  EXPECT_EQ(shortened.keyframes.size(), 10U);
+  EXPECT_EQ(shortened.fixes.front().keyframe_id, 21);
+  other.Invalidate();
+  ASSERT_TRUE(other.Solve(shortened, kQuadratic, 50));
+  EXPECT_LT(LargestDifference(shortened, whole), 1e-4);
+  EXPECT_THAT(other.NewestCovariance(), IsNear(chain.NewestCovariance(), 5e-5));
+}
+
+/// A stiff chain that is held by weak fixes alone: what a rigid shift costs is small beside what
+/// bending costs.
+KeyframeWindow MakeStiffWindow() {
+  KeyframeWindow window = MakeBentWindow(200, 3);
+  window.prior.reset();
+  for (Keyframe& keyframe : window.keyframes)
+    keyframe.covariance_PK = 1e-5 * Eigen::Matrix3d::Identity();
+  for (AttachedFix& fix : window.fixes) {
+    fix.fix.covariance = 49.0 * Eigen::Matrix3d::Identity();
+    PrepareResidual(fix);
+  }
+  return window;
+}
+
+TEST(ChainSolverTest, FindsTheMinimumInAFewIterationsFarFromIt) {
+  KeyframeWindow window = MakeStiffWindow();
+  KeyframeWindow shifted = MakeStiffWindow();
+  for (Keyframe& keyframe : shifted.keyframes)
+    keyframe.x_WK += Eigen::Vector3d(30.0, -20.0, 0.0);
+  ASSERT_TRUE(SolveBatch(window, kQuadratic, 100));
+  ASSERT_TRUE(ChainSolver(200).Solve(shifted, kQuadratic, 3));
+  EXPECT_LT(LargestDifference(shifted, window), 2e-3);
+}
+
+/// Turned by a right angle, a whole step of Gauss and Newton's is no good.
+TEST(ChainSolverTest, ComesDownFromFarAwayInShorterSteps) {
+  KeyframeWindow window = MakeBentWindow(100, 4);
+  KeyframeWindow turned = MakeBentWindow(100, 4);
+  const Pose2 X_turned(5.0, 3.0, 1.5);
+  for (Keyframe& keyframe : turned.keyframes)
+    keyframe.SetX_WK(X_turned * keyframe.X_WK());
+  ASSERT_TRUE(SolveBatch(window, kQuadratic, 100));
+  ASSERT_TRUE(ChainSolver(100).Solve(turned, kQuadratic, 50));
+  EXPECT_LT(LargestDifference(turned, window), 2e-3);
+}
+
+TEST(ChainSolverTest, KeepsTheEstimatesWhenTheEquationsAreNotFinite) {
+  KeyframeWindow window = MakeBentWindow(5, 5);
+  window.keyframes[2].X_PK = Pose2(std::nan(""), 0.0, 0.0);
+  const Eigen::Vector3d before = window.keyframes.back().x_WK;
+  EXPECT_FALSE(ChainSolver(5).Solve(window, kQuadratic, 5));
+  EXPECT_EQ(window.keyframes.back().x_WK, before);
+}
+
+TEST(ChainSolverTest, AWindowThatSlidesStaysNearOneThatGrows) {
+  GrowingWindow whole(0.0, 6);
+  GrowingWindow sliding(0.0, 6);
+  for (int i = 0; i < 300; ++i) {
+    whole.GrowAndRemember(kQuadratic, 2);
+    sliding.GrowAndRemember(kQuadratic, 2);
+    sliding.Shorten(40, kQuadratic);
+  }
+  EXPECT_EQ(sliding.window().keyframes.size(), 40U);
+  EXPECT_LT(LargestDifference(sliding.window(), whole.window()), 2e-3);
+}
+
+}  // namespace
+}  // namespace relocd
