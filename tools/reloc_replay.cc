@@ -99,12 +99,10 @@ class Replay {
     const InferenceConfig& config = config_.inference;
     auto localizer = MapLocalizer::Load(config);
     if (!localizer) return std::move(localizer).error();
-    inference_ = std::make_unique<InferenceNode>(config,
-                                                 std::move(*localizer),
-                                                 config_.CameraMountings(),
-                                                 bus_,
-                                                 kReplayRunId,
-                                                 [this] { return now_; });
+    inference_ = std::make_unique<InferenceNode>(
+        config, std::move(*localizer), config_.CameraMountings(), bus_, kReplayRunId, [this] {
+          return now_;
+        });
     bus_.Subscribe<localization_t>(
         channels::kLocalization, Delivery::kNewest, [this](const localization_t& localization) {
           inference_->Handle(localization);
@@ -120,8 +118,7 @@ class Replay {
   }
 
   Result<void> AddSmoothing() {
-    smoother_ =
-        std::make_unique<SmootherNode>(
+    smoother_ = std::make_unique<SmootherNode>(
         config_.localization, config_.CameraMountings(), bus_, kReplayRunId);
     bus_.Subscribe<odometry_t>(channels::kOdometry,
                                Delivery::kEvery,

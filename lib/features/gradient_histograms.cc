@@ -91,10 +91,10 @@ GradientHistogramsConfig GradientHistogramsForImage(int width, int height) {
 }
 
 Result<std::unique_ptr<GradientHistograms>> GradientHistograms::Create(
-    const GradientHistogramsConfig& config) {
+    const GradientHistogramsConfig& config, int threads) {
   if (auto valid = Validate(config); !valid) return std::move(valid).error();
   cv::setNumThreads(1);  // resizing takes less than waking OpenCV's pool, and callers have threads
-  return std::unique_ptr<GradientHistograms>(new GradientHistograms(config));
+  return std::unique_ptr<GradientHistograms>(new GradientHistograms(config, threads));
 }
 
 int GradientHistogramsDimension(const GradientHistogramsConfig& config) {
@@ -145,17 +145,22 @@ Result<void> GradientHistograms::Extract(const GrayImage& image,
 void GradientHistograms::ExtractFromWorkingImage(std::span<const float> working,
                                                  std::size_t max_cells,
                                                  CellFeatures& features) {
-  maps_.Compute(working, config_.working_width, config_.working_height, config_.octaves);
+  maps_.Compute(working, config_.working_width, config_.working_height, config_.octaves, team_);
   ChooseCells(max_cells);
   const auto size = static_cast<std::size_t>(dimension());
   features.dimension = dimension();
   features.pixels.resize(cells_.size());
   features.values.resize(cells_.size() * size);
-  for (std::size_t index = 0; index < cells_.size(); ++index) {
-    const Eigen::Vector2f centre = CellCentre(cells_[index]);
-    features.pixels[index] = centre;
-    Describe(centre, std::span(features.values).subspan(index * size, size));
-  }
+  team_.Run([&](int part) {
+    const PartRange cells = RangeOfPart(static_cast<int>(cells_.size()), part, team_.size());
+    for (auto index = static_cast<std::size_t>(cells.begin);
+         index < static_cast<std::size_t>(cells.end);
+         ++index) {
+      const Eigen::Vector2f centre = CellCentre(cells_[index]);
+      features.pixels[index] = centre;
+      Describe(centre, std::span(features.values).subspan(index * size, size));
+    }
+  });
 }
 
 void GradientHistograms::Describe(const Eigen::Vector2f& centre, std::span<float> feature) const {

@@ -31,8 +31,10 @@ int GradientHistogramsDimension(const GradientHistogramsConfig& config);
 /// against the sky, or of shadows, and which side is the brighter one changes with the light.
 class GradientHistograms final : public FeatureExtractor {
  public:
+  /// @param threads  >= 1; features do not depend on it.
   /// @return kInvalidInput for a configuration that Validate refuses.
-  static Result<std::unique_ptr<GradientHistograms>> Create(const GradientHistogramsConfig& config);
+  static Result<std::unique_ptr<GradientHistograms>> Create(const GradientHistogramsConfig& config,
+                                                            int threads = 1);
 
   [[nodiscard]] int dimension() const override;
   Result<void> Extract(const GrayImage& image,
@@ -62,7 +64,8 @@ class GradientHistograms final : public FeatureExtractor {
     int row = 0;
   };
 
-  explicit GradientHistograms(const GradientHistogramsConfig& config) : config_(config) {}
+  GradientHistograms(const GradientHistogramsConfig& config, int threads)
+      : config_(config), team_(threads) {}
 
   /// The features of one cell.
   void Describe(const Eigen::Vector2f& centre, std::span<float> feature) const;
@@ -72,6 +75,7 @@ class GradientHistograms final : public FeatureExtractor {
   [[nodiscard]] Eigen::Vector2f CellCentre(const Cell& cell) const;
 
   GradientHistogramsConfig config_;
+  ThreadTeam team_;
   GradientMaps maps_;
   std::vector<float> working_;
   std::vector<Cell> cells_;

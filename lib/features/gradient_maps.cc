@@ -7,9 +7,10 @@
 
 #include "core/check.h"
 
-// The same source is compiled for two instruction sets and chosen when the program starts. Without
-// fused multiply-add (-ffp-contract=off) both give the same bits.
-#define RELOCD_VECTORISED __attribute__((target_clones("default", "arch=x86-64-v3")))
+// The same source is compiled for three instruction sets and chosen when the program starts. Without
+// fused multiply-add (-ffp-contract=off) all give the same bits.
+#define RELOCD_VECTORISED \
+  __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 
 namespace relocd {
 namespace {
@@ -44,29 +45,30 @@ struct RowTriple {
   const float* below;
 };
 
-/// Half-rectified projections of the Sobel gradient on eight directions, interleaved.
-RELOCD_VECTORISED void OrientationRow(const RowTriple& rows, int width, float* out) {
+/// The Sobel gradient of a row.
+RELOCD_VECTORISED void GradientRow(const RowTriple& rows, int width, float* gx, float* gy) {
+  const auto at = [&rows, gx, gy](int x, int left, int right) {
+    gx[x] = (rows.above[right] - rows.above[left]) + (rows.below[right] - rows.below[left]) +
+            2.0F * (rows.here[right] - rows.here[left]);
+    gy[x] = (rows.below[left] - rows.above[left]) + (rows.below[right] - rows.above[right]) +
+            2.0F * (rows.below[x] - rows.above[x]);
+  };
+  at(0, 0, 1);
+  for (int x = 1; x + 1 < width; ++x) {
+    at(x, x - 1, x + 1);
+  }
+  at(width - 1, width - 2, width - 1);
+}
+
+/// Half-rectified projections of the gradient on eight directions, interleaved.
+RELOCD_VECTORISED void OrientationRow(const float* gx, const float* gy, int width, float* out) {
   static constexpr float kDiagonal = 0.70710678F;
+  static constexpr Bins kCosines = {1, kDiagonal, 0, -kDiagonal, -1, -kDiagonal, 0, kDiagonal};
+  static constexpr Bins kSines = {0, kDiagonal, 1, kDiagonal, 0, -kDiagonal, -1, -kDiagonal};
   for (int x = 0; x < width; ++x) {
-    const int left = x > 0 ? x - 1 : 0;
-    const int right = x + 1 < width ? x + 1 : width - 1;
-    const float gx = (rows.above[right] - rows.above[left]) +
-                     (rows.below[right] - rows.below[left]) +
-                     2.0F * (rows.here[right] - rows.here[left]);
-    const float gy = (rows.below[left] - rows.above[left]) +
-                     (rows.below[right] - rows.above[right]) +
-                     2.0F * (rows.below[x] - rows.above[x]);
-    const float sum = kDiagonal * (gx + gy);
-    const float difference = kDiagonal * (gy - gx);
-    float* bins = out + static_cast<std::ptrdiff_t>(x) * kBins;
-    bins[0] = gx > 0.0F ? gx : 0.0F;
-    bins[1] = sum > 0.0F ? sum : 0.0F;
-    bins[2] = gy > 0.0F ? gy : 0.0F;
-    bins[3] = difference > 0.0F ? difference : 0.0F;
-    bins[4] = gx < 0.0F ? -gx : 0.0F;
-    bins[5] = sum < 0.0F ? -sum : 0.0F;
-    bins[6] = gy < 0.0F ? -gy : 0.0F;
-    bins[7] = difference < 0.0F ? -difference : 0.0F;
+    const Bins projections = gx[x] * kCosines + gy[x] * kSines;
+    *reinterpret_cast<Bins*>(out + static_cast<std::ptrdiff_t>(x) * kBins) =
+        projections > 0.0F ? projections : Bins{};
   }
 }
 
@@ -114,18 +116,19 @@ void PadRow(float* row, int places, int padding) {
   }
 }
 
-/// Sums of rows with the border repeated: out row r is centred on in row r * step.
+/// Sums of rows with the border repeated, for some of the out rows: r is centred on in row r *
+/// step.
 void SmoothColumns(const std::vector<float>& in,
                    int in_rows,
                    std::span<const float> kernel,
                    int step,
+                   PartRange out_rows,
                    std::vector<float>& out) {
   const std::size_t row_size = in.size() / static_cast<std::size_t>(in_rows);
-  const int out_rows = static_cast<int>(out.size() / row_size);
   const int radius = static_cast<int>(kernel.size()) / 2;
   std::array<const float*, 64> rows{};
   RELOCD_CHECK(kernel.size() <= rows.size(), "smoothing kernel is too long");
-  for (int row = 0; row < out_rows; ++row) {
+  for (int row = out_rows.begin; row < out_rows.end; ++row) {
     for (std::size_t tap = 0; tap < kernel.size(); ++tap) {
       const int from = std::clamp(row * step + static_cast<int>(tap) - radius, 0, in_rows - 1);
       rows[tap] = in.data() + static_cast<std::size_t>(from) * row_size;
@@ -191,11 +194,14 @@ constexpr std::array<std::array<int, 2>, GradientMaps::kPoints> kPointOffsets = 
     {0, -kOuterRadiusPx},
     {8, -8},
 }};
+/// The others are so small that sharing them out takes longer than it saves.
+constexpr int kSharedOctaves = 2;
 constexpr std::size_t kFinePoints = 9;  // the centre and the inner ring
 
 }  // namespace
 
-void GradientMaps::Compute(std::span<const float> pixels, int width, int height, int octaves) {
+void GradientMaps::Compute(
+    std::span<const float> pixels, int width, int height, int octaves, ThreadTeam& team) {
   RELOCD_CHECK(pixels.size() == static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
                "pixels must be width * height");
   RELOCD_CHECK(octaves >= 1 && (width >> (octaves - 1)) >= 4 && (height >> (octaves - 1)) >= 4,
@@ -220,59 +226,101 @@ void GradientMaps::Compute(std::span<const float> pixels, int width, int height,
                  octave.image.data() + static_cast<std::ptrdiff_t>(y) * octave.image_width);
       }
     }
-    ComputeOctave(octave);
+    ComputeOctave(octave, index < kSharedOctaves ? team : alone_);
   }
 }
 
-void GradientMaps::ComputeOctave(Octave& octave) {
+void GradientMaps::ComputeOctave(Octave& octave, ThreadTeam& team) {
   const std::vector<float> fine_kernel = GaussianKernel(kFineSigmaPx);
   const std::vector<float> coarse_kernel = GaussianKernel(
       std::sqrt(kCoarseSigmaPx * kCoarseSigmaPx - kFineSigmaPx * kFineSigmaPx) / octave.step);
-  const int width = octave.image_width;
-  const int height = octave.image_height;
-  octave.columns = (width + octave.step - 1) / octave.step;
-  octave.rows = (height + octave.step - 1) / octave.step;
+  octave.columns = (octave.image_width + octave.step - 1) / octave.step;
+  octave.rows = (octave.image_height + octave.step - 1) / octave.step;
   const std::size_t row_size = static_cast<std::size_t>(octave.columns) * kBins;
   const std::size_t grid_size = row_size * static_cast<std::size_t>(octave.rows);
-  const int fine_radius = static_cast<int>(fine_kernel.size()) / 2;
-  const int coarse_radius = static_cast<int>(coarse_kernel.size()) / 2;
-  const int padding = std::max(fine_radius, coarse_radius);
-  orientation_row_.resize(static_cast<std::size_t>(width + 2 * padding) * kBins);
-  smoothed_rows_.resize(row_size * static_cast<std::size_t>(height));
+  smoothed_rows_.resize(row_size * static_cast<std::size_t>(octave.image_height));
   octave.fine.resize(grid_size);
   octave.coarse.resize(grid_size);
+  part_rows_.resize(std::max(part_rows_.size(), static_cast<std::size_t>(team.size())));
 
-  for (int y = 0; y < height; ++y) {
-    const auto image_row = [&](int row) {
-      return octave.image.data() +
-             static_cast<std::ptrdiff_t>(std::clamp(row, 0, height - 1)) * width;
-    };
-    OrientationRow({image_row(y - 1), image_row(y), image_row(y + 1)},
+  team.Run([&](int part) {
+    SmoothOrientations(octave,
+                       fine_kernel,
+                       RangeOfPart(octave.image_height, part, team.size()),
+                       part_rows_[static_cast<std::size_t>(part)]);
+  });
+  team.Run([&](int part) {
+    SmoothColumns(smoothed_rows_,
+                  octave.image_height,
+                  fine_kernel,
+                  octave.step,
+                  RangeOfPart(octave.rows, part, team.size()),
+                  octave.fine);
+  });
+  smoothed_rows_.resize(grid_size);
+  team.Run([&](int part) {
+    SmoothFine(octave,
+               coarse_kernel,
+               RangeOfPart(octave.rows, part, team.size()),
+               part_rows_[static_cast<std::size_t>(part)]);
+  });
+  team.Run([&](int part) {
+    SmoothColumns(smoothed_rows_,
+                  octave.rows,
+                  coarse_kernel,
+                  1,
+                  RangeOfPart(octave.rows, part, team.size()),
+                  octave.coarse);
+  });
+}
+
+void GradientMaps::SmoothOrientations(const Octave& octave,
+                                      std::span<const float> kernel,
+                                      PartRange rows,
+                                      PartRows& buffers) {
+  const int width = octave.image_width;
+  const int radius = static_cast<int>(kernel.size()) / 2;
+  buffers.gx.resize(static_cast<std::size_t>(width));
+  buffers.gy.resize(static_cast<std::size_t>(width));
+  buffers.padded.resize(static_cast<std::size_t>(width + 2 * radius) * kBins);
+  const auto image_row = [&octave](int row) {
+    return octave.image.data() +
+           static_cast<std::ptrdiff_t>(std::clamp(row, 0, octave.image_height - 1)) *
+               octave.image_width;
+  };
+  for (int y = rows.begin; y < rows.end; ++y) {
+    GradientRow({image_row(y - 1), image_row(y), image_row(y + 1)},
+                width,
+                buffers.gx.data(),
+                buffers.gy.data());
+    OrientationRow(buffers.gx.data(),
+                   buffers.gy.data(),
                    width,
-                   orientation_row_.data() + static_cast<std::ptrdiff_t>(fine_radius) * kBins);
-    PadRow(orientation_row_.data(), width, fine_radius);
-    SmoothRow(orientation_row_.data(),
-              fine_kernel,
+                   buffers.padded.data() + static_cast<std::ptrdiff_t>(radius) * kBins);
+    PadRow(buffers.padded.data(), width, radius);
+    SmoothRow(buffers.padded.data(),
+              kernel,
               octave.step,
               octave.columns,
-              smoothed_rows_.data() + static_cast<std::size_t>(y) * row_size);
+              smoothed_rows_.data() + static_cast<std::ptrdiff_t>(y) * octave.columns * kBins);
   }
-  SmoothColumns(smoothed_rows_, height, fine_kernel, octave.step, octave.fine);
+}
 
-  smoothed_rows_.resize(grid_size);
-  for (int row = 0; row < octave.rows; ++row) {
-    const float* fine_row = octave.fine.data() + static_cast<std::size_t>(row) * row_size;
-    std::copy_n(fine_row,
+void GradientMaps::SmoothFine(const Octave& octave,
+                              std::span<const float> kernel,
+                              PartRange rows,
+                              PartRows& buffers) {
+  const std::size_t row_size = static_cast<std::size_t>(octave.columns) * kBins;
+  const int radius = static_cast<int>(kernel.size()) / 2;
+  buffers.padded.resize(static_cast<std::size_t>(octave.columns + 2 * radius) * kBins);
+  for (int row = rows.begin; row < rows.end; ++row) {
+    const std::size_t begin = static_cast<std::size_t>(row) * row_size;
+    std::copy_n(octave.fine.data() + begin,
                 row_size,
-                orientation_row_.data() + static_cast<std::ptrdiff_t>(coarse_radius) * kBins);
-    PadRow(orientation_row_.data(), octave.columns, coarse_radius);
-    SmoothRow(orientation_row_.data(),
-              coarse_kernel,
-              1,
-              octave.columns,
-              smoothed_rows_.data() + static_cast<std::size_t>(row) * row_size);
+                buffers.padded.data() + static_cast<std::ptrdiff_t>(radius) * kBins);
+    PadRow(buffers.padded.data(), octave.columns, radius);
+    SmoothRow(buffers.padded.data(), kernel, 1, octave.columns, smoothed_rows_.data() + begin);
   }
-  SmoothColumns(smoothed_rows_, octave.rows, coarse_kernel, 1, octave.coarse);
 }
 
 GradientMaps::GridPlace GradientMaps::PlaceInOctave(int octave, float x, float y) const {

@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "core/thread_team.h"
+
 namespace relocd {
 
 /// How an image is turned into gradient histograms. Part of the map file: a head only understands
@@ -30,7 +32,8 @@ class GradientMaps {
   static constexpr int kDescriptorSize = kPoints * kOrientations;
 
   /// @param pixels  row-major, width * height gray values in 0..255.
-  void Compute(std::span<const float> pixels, int width, int height, int octaves);
+  /// @param team  does the work; the result does not depend on its size.
+  void Compute(std::span<const float> pixels, int width, int height, int octaves, ThreadTeam& team);
 
   [[nodiscard]] int octaves() const { return static_cast<int>(octaves_.size()); }
 
@@ -72,12 +75,30 @@ class GradientMaps {
     int row = 0;
   };
 
-  void ComputeOctave(Octave& octave);
+  /// What a thread needs for the row that it works on.
+  struct PartRows {
+    std::vector<float> gx;
+    std::vector<float> gy;
+    std::vector<float> padded;
+  };
+
+  void ComputeOctave(Octave& octave, ThreadTeam& team);
+  /// Rows of the image to smoothed_rows_.
+  void SmoothOrientations(const Octave& octave,
+                          std::span<const float> kernel,
+                          PartRange rows,
+                          PartRows& buffers);
+  /// Rows of octave.fine to smoothed_rows_.
+  void SmoothFine(const Octave& octave,
+                  std::span<const float> kernel,
+                  PartRange rows,
+                  PartRows& buffers);
   [[nodiscard]] GridPlace PlaceInOctave(int octave, float x, float y) const;
 
   std::vector<Octave> octaves_;
-  std::vector<float> orientation_row_;
-  std::vector<float> smoothed_rows_;
+  std::vector<float> smoothed_rows_;  ///< Smoothed along the row only.
+  std::vector<PartRows> part_rows_;   ///< One a thread.
+  ThreadTeam alone_{1};
 };
 
 }  // namespace relocd

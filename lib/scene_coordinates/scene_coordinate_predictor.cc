@@ -9,7 +9,7 @@ namespace relocd {
 Result<std::unique_ptr<SceneCoordinatePredictor>> SceneCoordinatePredictor::Create(
     const SceneMap& map, int threads) {
   std::unique_ptr<SceneCoordinatePredictor> predictor(new SceneCoordinatePredictor(map));
-  auto extractor = GradientHistograms::Create(map.features);
+  auto extractor = GradientHistograms::Create(map.features, threads);
   if (!extractor) return std::move(extractor).error();
   predictor->extractor_ = std::move(*extractor);
   auto whitening = OnednnLayers::ForWhitening(map.whitening, threads);

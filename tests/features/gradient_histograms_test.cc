@@ -83,6 +83,16 @@ TEST(GradientHistogramsTest, WhichSideIsBrighterCountsInFineOctavesOnly) {
   EXPECT_LT(coarse, 1e-3 * fine);
 }
 
+TEST(GradientHistogramsTest, TheNumberOfThreadsDoesNotChangeTheFeatures) {
+  const GrayImage image = Texture(4).Image(kWidth, kHeight);
+  CellFeatures one;
+  ASSERT_TRUE(TestExtractor()->Extract(image, 300, one));
+  CellFeatures three;
+  ASSERT_TRUE(GradientHistograms::Create(TestConfig(), 3).value()->Extract(image, 300, three));
+  EXPECT_EQ(one.values, three.values);
+  EXPECT_EQ(one.pixels, three.pixels);
+}
+
 TEST(GradientHistogramsTest, ContrastCancels) {
   const auto extractor = TestExtractor();
   const GrayImage image = Texture(2).Image(kWidth, kHeight);

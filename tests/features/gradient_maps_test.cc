@@ -37,10 +37,11 @@ TEST(GradientMapsTest, TurningTheImageTurnsTheRingsAndTheOrientations) {
           image.pixels[static_cast<std::size_t>(v * kSide + u)];
     }
   }
+  ThreadTeam team(1);
   GradientMaps maps;
-  maps.Compute(Floats(image), kSide, kSide, 1);
+  maps.Compute(Floats(image), kSide, kSide, 1, team);
   GradientMaps turned_maps;
-  turned_maps.Compute(Floats(turned), kSide, kSide, 1);
+  turned_maps.Compute(Floats(turned), kSide, kSide, 1, team);
   const Histogram before = SampleAt(maps, 0, 80.0F, 60.0F);
   const Histogram after = SampleAt(turned_maps, 0, 100.0F, 80.0F);
   double worst = 0.0;
@@ -61,13 +62,14 @@ TEST(GradientMapsTest, TurningTheImageTurnsTheRingsAndTheOrientations) {
 TEST(GradientMapsTest, IgnoresAConstant) {
   const GrayImage image = Texture(2).Image(kSide, kSide);
   std::vector<float> pixels = Floats(image);
+  ThreadTeam team(1);
   GradientMaps maps;
-  maps.Compute(pixels, kSide, kSide, 3);
+  maps.Compute(pixels, kSide, kSide, 3, team);
   const Histogram before = SampleAt(maps, 2, 80.0F, 80.0F);
   for (float& pixel : pixels) {
     pixel += 64.0F;  // exact in float
   }
-  maps.Compute(pixels, kSide, kSide, 3);
+  maps.Compute(pixels, kSide, kSide, 3, team);
   const Histogram after = SampleAt(maps, 2, 80.0F, 80.0F);
   for (std::size_t i = 0; i < before.size(); ++i) {
     EXPECT_NEAR(before[i], after[i], 1e-2F);
@@ -81,8 +83,9 @@ TEST(GradientMapsTest, SeesARampInOneDirection) {
       pixels[static_cast<std::size_t>(v * kSide + u)] = static_cast<float>(u);
     }
   }
+  ThreadTeam team(1);
   GradientMaps maps;
-  maps.Compute(pixels, kSide, kSide, 1);
+  maps.Compute(pixels, kSide, kSide, 1, team);
   const Histogram histogram = SampleAt(maps, 0, 80.0F, 80.0F);
   // Sobel's operator gives 8 for a slope of 1; the diagonals see it by cos(45 degrees).
   EXPECT_NEAR(histogram[0], 8.0F, 1e-3F);
@@ -93,8 +96,9 @@ TEST(GradientMapsTest, SeesARampInOneDirection) {
 }
 
 TEST(GradientMapsTest, AffinityIsOneForThePlaceItself) {
+  ThreadTeam team(1);
   GradientMaps maps;
-  maps.Compute(Floats(Texture(3).Image(kSide, kSide)), kSide, kSide, 1);
+  maps.Compute(Floats(Texture(3).Image(kSide, kSide)), kSide, kSide, 1, team);
   Histogram roots = SampleAt(maps, 0, 80.0F, 80.0F);
   float sum = 0.0F;
   for (const float value : roots) {
