@@ -15,6 +15,7 @@
 #include "core/file.h"
 #include "map_dataset.h"
 #include "map_evaluation.h"
+#include "map_input.h"
 #include "map_training.h"
 #include "scene_coordinates/map_file.h"
 
@@ -104,23 +105,49 @@ struct TrainCommand {
   std::vector<std::string> datasets;
   std::string out;
   std::string report;
+  std::string input_check = "refuse";
   MapTrainingOptions options;
 };
 
-Result<int> Train(const TrainCommand& command) {
-  const bool selects = !command.frames.split.empty() || !command.frames.frames.empty();
-  if (command.datasets.size() > 1 && selects) {
-    return Error{ErrorKind::kInvalidInput,
-                 fmt::format("--split and --frames go with one --dataset, not with {}",
-                             command.datasets.size())};
+/// The frames of all data sets that the selection keeps.
+Result<std::vector<SelectedFrames>> SelectDrives(const std::vector<std::string>& datasets,
+                                                 FrameSelection selection) {
+  const bool selects = !selection.split.empty() || !selection.frames.empty();
+  if (datasets.size() > 1 && selects) {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format("--split and --frames go with one --dataset, not with {}", datasets.size())};
   }
   std::vector<SelectedFrames> drives;
-  FrameSelection selection = command.frames;
-  for (const std::string& dataset : command.datasets) {
+  for (const std::string& dataset : datasets) {
     selection.dataset = dataset;
     auto selected = SelectFrames(selection, SplitPart::kTrain);
     if (!selected) return std::move(selected).error();
     drives.push_back(std::move(*selected));
+  }
+  return drives;
+}
+
+struct CheckCommand {
+  FrameSelection frames;  ///< Without the data set.
+  std::vector<std::string> datasets;
+  int threads = 2;
+};
+
+Result<int> Check(const CheckCommand& command) {
+  const auto drives = SelectDrives(command.datasets, command.frames);
+  if (!drives) return drives.error();
+  return PrintChecks(*drives, command.threads) ? kExitOk : kExitConfig;
+}
+
+Result<int> Train(const TrainCommand& command) {
+  const auto gate = ParseInputGate(command.input_check);
+  if (!gate) return gate.error();
+  const auto selected = SelectDrives(command.datasets, command.frames);
+  if (!selected) return selected.error();
+  const std::vector<SelectedFrames>& drives = *selected;
+  if (auto checked = CheckDrives(drives, *gate, command.options.threads); !checked) {
+    return checked.error();
   }
   auto trained = TrainMap(drives, command.options);
   if (!trained) return std::move(trained).error();
@@ -283,6 +310,15 @@ int Main(int argc, char** argv) {
   CLI::App app("Makes a map of a recorded drive, and finds images in it.", "reloc map");
   app.require_subcommand(1);
 
+  CheckCommand check;
+  auto* check_app =
+      app.add_subcommand("check", "whether a data set can make a good map, and why not");
+  check_app
+      ->add_option("--dataset", check.datasets, "folder of a data set; more than one may be given")
+      ->required();
+  AddFrameOptions(*check_app, check.frames, "file of the split: its train rows are checked");
+  check_app->add_option("--threads", check.threads, "default 2");
+
   TrainCommand train;
   auto* train_app = app.add_subcommand("train", "make a map of a data set");
   train_app
@@ -295,6 +331,9 @@ int Main(int argc, char** argv) {
   train_app->add_option("--threads", train.options.threads, "default 2");
   train_app->add_option("--seed", train.options.seed, "default 1");
   train_app->add_option("--report", train.report, "folder for a report on held-out frames");
+  train_app->add_option("--input-check",
+                        train.input_check,
+                        "what follows from a bad data set: refuse (default), warn, off");
   train_app->add_option("--iterations", train.options.head.iterations, "steps for each region");
   train_app->add_option("--views", train.options.cells.views_per_image, "changed copies an image");
   train_app->add_option("--held-out-every", train.options.held_out_every, "default 8");
@@ -320,6 +359,7 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kExitOk : kExitUsage;
   }
+  if (check_app->parsed()) return Finish(Check(check));
   if (train_app->parsed()) return Finish(Train(train));
   if (localize_app->parsed()) return Finish(Localize(localize));
   return Finish(Info(map_path, json));

@@ -118,7 +118,8 @@ TEST_F(RelocMapTest, RefusesImagesOfAnotherSize) {
   folder_.Write("intrinsics.txt", "220 220 119.5 79.5 320 160\n");
   const Outcome outcome = Run("train --dataset . --out a.relocmap");
   EXPECT_EQ(outcome.exit_code, kExitConfig);
-  EXPECT_THAT(outcome.output, HasSubstr("image is 240 x 160 pixels, must be 320 x 160"));
+  EXPECT_THAT(outcome.output,
+              HasSubstr("all images are 240 x 160 pixels, must be 320 x 160 as intrinsics.txt"));
 }
 
 TEST_F(RelocMapTest, RefusesADriveThatIsTooShort) {
@@ -133,10 +134,49 @@ TEST_F(RelocMapTest, RefusesAWorldThatLiesOnItsSide) {
     poses += fmt::format("{:.1f} {} 0 0 0 0 0.70710678 0.70710678\n", 0.1 * index, 0.4 * index);
   }
   folder_.Write("poses_tum.txt", poses);
-  const Outcome outcome = Run("train --dataset . --out a.relocmap");
+  const Outcome outcome = Run("train --dataset . --input-check off --out a.relocmap");
   EXPECT_EQ(outcome.exit_code, kExitConfig);
   EXPECT_THAT(outcome.output,
               HasSubstr("up axis is +x of the data set's world, must be +z, +y or -y"));
+}
+
+TEST_F(RelocMapTest, ChecksADriveAndSaysWhatIsWrong) {
+  const Outcome usable = Run("check --dataset .");
+  EXPECT_EQ(usable.exit_code, kExitOk) << usable.output;
+  EXPECT_THAT(usable.output,
+              AllOf(HasSubstr(".: 9 frames, 3.2 m in 0.8 s, an image every 0.40 m\n"),
+                    HasSubstr(".: warning: frames: 9 frames are few"),
+                    HasSubstr("\n.: usable\n")));
+
+  std::string poses;  // the world seen from the camera
+  for (int index = 0; index < 9; ++index)
+    poses += fmt::format("{:.1f} {} {} 0 0 0 0 1\n", 0.1 * index, -0.4 * index, -0.02 * index);
+  folder_.Write("poses_tum.txt", poses);
+  const Outcome inverted = Run("check --dataset .");
+  EXPECT_EQ(inverted.exit_code, kExitConfig);
+  EXPECT_THAT(inverted.output,
+              AllOf(HasSubstr(".: refused: poses: "),
+                    HasSubstr("if the poses are world to camera: write poses_tum.txt as")));
+}
+
+TEST_F(RelocMapTest, ARefusalCanBeOverridden) {
+  std::string poses;
+  for (int index = 0; index < 9; ++index)
+    poses += fmt::format("{:.1f} {} {} 0 0 0 0 1\n", 0.1 * index, -0.4 * index, -0.02 * index);
+  folder_.Write("poses_tum.txt", poses);
+  const std::string train =
+      "train --dataset . --iterations 3 --views 1 --threads 1 --out a.relocmap";
+  const Outcome refused = Run(train);
+  EXPECT_EQ(refused.exit_code, kExitConfig);
+  EXPECT_THAT(refused.output,
+              AllOf(HasSubstr("reloc map: .: poses: "),
+                    HasSubstr("(--input-check warn makes the map nevertheless)")));
+  const Outcome warned = Run(train + " --input-check warn");
+  EXPECT_EQ(warned.exit_code, kExitOk) << warned.output;
+  EXPECT_THAT(warned.output, HasSubstr(".: warning: poses: "));
+  const Outcome misspelt = Run(train + " --input-check never");
+  EXPECT_EQ(misspelt.exit_code, kExitConfig);
+  EXPECT_THAT(misspelt.output, HasSubstr("is 'never', must be refuse, warn or off"));
 }
 
 TEST_F(RelocMapTest, RefusesAWrongCommandLine) {
