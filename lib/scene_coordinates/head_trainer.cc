@@ -18,6 +18,7 @@
 #include <oneapi/dnnl/dnnl.hpp>
 
 #include "core/check.h"
+#include "scene_coordinates/head_optimizer.h"
 #include "scene_coordinates/scene_loss.h"
 #include "scene_coordinates/shard_network.h"
 
@@ -28,42 +29,15 @@ namespace {
 
 constexpr int kReportEvery = 50;
 
-/// Factors of AdamW (Loshchilov and Hutter, "Decoupled weight decay regularization", 2019) for one
-/// step.
-struct AdamStep {
-  float gradient_scale = 0.0F;  ///< From the sum over the batch to its mean.
-  float rate = 0.0F;
-  float decay = 0.0F;
-  float momentum_correction = 0.0F;
-  float variance_correction = 0.0F;
-};
-constexpr float kMomentum = 0.9F;
-constexpr float kVarianceMomentum = 0.999F;
-constexpr float kAdamEpsilon = 1e-8F;
-
-/// One range of parameters and all that belongs to it.
-struct AdamRange {
-  std::size_t size = 0;
-  float* parameters = nullptr;
-  float* momentum = nullptr;
-  float* variance = nullptr;
-  const float* gradients = nullptr;  ///< Of the first shard; the others follow at a stride.
-  std::size_t shard_stride = 0;
-};
-
-RELOCD_VECTORISED void UpdateParameters(const AdamStep& step, const AdamRange& range) {
+/// Into the first shard's gradient: the mean over the batch of what each shard has summed up.
+RELOCD_VECTORISED void AverageShards(float* gradients,
+                                     std::size_t stride,
+                                     std::size_t size,
+                                     float scale) {
   static_assert(kTrainerShards == 4);
-  const std::size_t stride = range.shard_stride;
-  for (std::size_t i = 0; i < range.size; ++i) {
-    const float* gradients = range.gradients + i;
-    const float gradient = step.gradient_scale * ((gradients[0] + gradients[stride]) +
-                                                  (gradients[2 * stride] + gradients[3 * stride]));
-    range.momentum[i] = kMomentum * range.momentum[i] + (1.0F - kMomentum) * gradient;
-    range.variance[i] =
-        kVarianceMomentum * range.variance[i] + (1.0F - kVarianceMomentum) * gradient * gradient;
-    const float deviation = std::sqrt(range.variance[i] * step.variance_correction) + kAdamEpsilon;
-    range.parameters[i] -= step.rate * range.momentum[i] * step.momentum_correction / deviation +
-                           step.decay * range.parameters[i];
+  for (std::size_t i = 0; i < size; ++i) {
+    gradients[i] = scale * ((gradients[i] + gradients[stride + i]) +
+                            (gradients[2 * stride + i] + gradients[3 * stride + i]));
   }
 }
 
@@ -76,17 +50,21 @@ void Narrow(const float* in, std::size_t size, float* out) {
   std::copy_n(in, size, out);
 }
 
-/// The learning rate's one cycle: up along a line, down along a cosine.
-double LearningRate(const HeadTrainerConfig& config, int iteration) {
+/// The one cycle of the learning rates, as a share of the highest: up along a line, down along a
+/// cosine.
+double RateShare(const HeadTrainerConfig& config, int iteration) {
   constexpr double kFirst = 0.04;
   constexpr double kLast = 0.002;
   const double progress = static_cast<double>(iteration) / config.iterations;
-  if (progress < config.warm_up) {
-    return config.learning_rate * (kFirst + (1.0 - kFirst) * progress / config.warm_up);
-  }
+  if (progress < config.warm_up) return kFirst + (1.0 - kFirst) * progress / config.warm_up;
   const double down = (progress - config.warm_up) / (1.0 - config.warm_up);
-  return config.learning_rate *
-         (kLast + (1.0 - kLast) * 0.5 * (1.0 + std::cos(std::numbers::pi * down)));
+  return kLast + (1.0 - kLast) * 0.5 * (1.0 + std::cos(std::numbers::pi * down));
+}
+
+/// Logarithmic until most points are about right, in the share of the iterations that this takes.
+RobustShape Shape(const HeadTrainerConfig& config, int iteration) {
+  constexpr double kFar = 0.65;
+  return iteration < kFar * config.iterations ? RobustShape::kLogarithm : RobustShape::kTanh;
 }
 
 /// Wide for most of the training, then closing fast: a quarter of an ellipse.
@@ -141,6 +119,7 @@ class Trainer {
  public:
   Trainer(const TrainingSet& set,
           const HeadTrainerConfig& config,
+          Precision precision,
           const std::function<void(const TrainingProgress&)>& progress);
 
   Head Run();
@@ -148,7 +127,7 @@ class Trainer {
  private:
   void RunThread(std::size_t thread, std::barrier<>& barrier);
   void RunShard(std::size_t thread, std::size_t shard);
-  void UpdateRange(std::size_t thread);
+  void UpdateLayers(std::size_t thread);
   /// By one thread, between the steps of all.
   void Advance();
   void Report();
@@ -162,8 +141,7 @@ class Trainer {
   ParameterLayout layout_;
   std::vector<float> parameters_;
   std::vector<Number> narrow_parameters_;
-  std::vector<float> momentum_;
-  std::vector<float> variance_;
+  HeadOptimizer optimizer_;
   std::vector<float> gradients_;  ///< kTrainerShards x layout_.size()
   std::vector<LossCamera> cameras_;
   std::vector<std::unique_ptr<ShardNetwork<Number>>> networks_;  ///< One a thread.
@@ -172,7 +150,7 @@ class Trainer {
   std::size_t next_in_order_ = 0;
   int iteration_ = 0;
   double loss_since_report_ = 0.0;
-  AdamStep adam_;
+  OptimizerStep step_;
   SceneLossConfig loss_config_;
 };
 
@@ -191,6 +169,7 @@ void PlaceHead(const TrainingSet& set, Head& head) {
 template <typename Number>
 Trainer<Number>::Trainer(const TrainingSet& set,
                          const HeadTrainerConfig& config,
+                         Precision precision,
                          const std::function<void(const TrainingProgress&)>& progress)
     : set_(set),
       config_(config),
@@ -200,8 +179,7 @@ Trainer<Number>::Trainer(const TrainingSet& set,
       layout_(config.shape),
       parameters_(FlattenHead(head_, layout_)),
       narrow_parameters_(layout_.size()),
-      momentum_(layout_.size()),
-      variance_(layout_.size()),
+      optimizer_(layout_, precision),
       gradients_(kTrainerShards * layout_.size()),
       order_(set.targets.size()) {
   Narrow(parameters_.data(), parameters_.size(), narrow_parameters_.data());
@@ -245,7 +223,7 @@ void Trainer<Number>::RunThread(std::size_t thread, std::barrier<>& barrier) {
       RunShard(thread, shard);
     }
     barrier.arrive_and_wait();
-    UpdateRange(thread);
+    UpdateLayers(thread);
     barrier.arrive_and_wait();
     if (thread == 0) Advance();
     barrier.arrive_and_wait();
@@ -275,17 +253,17 @@ void Trainer<Number>::RunShard(std::size_t thread, std::size_t shard) {
 }
 
 template <typename Number>
-void Trainer<Number>::UpdateRange(std::size_t thread) {
-  const std::size_t begin = layout_.size() * thread / networks_.size();
-  const std::size_t end = layout_.size() * (thread + 1) / networks_.size();
-  UpdateParameters(adam_,
-                   {end - begin,
-                    parameters_.data() + begin,
-                    momentum_.data() + begin,
-                    variance_.data() + begin,
-                    gradients_.data() + begin,
-                    layout_.size()});
-  Narrow(parameters_.data() + begin, end - begin, narrow_parameters_.data() + begin);
+void Trainer<Number>::UpdateLayers(std::size_t thread) {
+  const float mean = 1.0F / static_cast<float>(config_.batch);
+  const auto layers = static_cast<std::size_t>(layout_.shape().layer_count());
+  for (std::size_t layer = thread; layer < layers; layer += networks_.size()) {
+    const auto index = static_cast<int>(layer);
+    const std::size_t begin = layout_.WeightsBegin(index);
+    const std::size_t end = layer + 1 == layers ? layout_.size() : layout_.WeightsBegin(index + 1);
+    AverageShards(gradients_.data() + begin, layout_.size(), end - begin, mean);
+    optimizer_.UpdateLayer(index, step_, std::span(gradients_).first(layout_.size()), parameters_);
+    Narrow(parameters_.data() + begin, end - begin, narrow_parameters_.data() + begin);
+  }
 }
 
 template <typename Number>
@@ -326,14 +304,13 @@ void Trainer<Number>::BeginStep() {
     std::shuffle(order_.begin(), order_.end(), engine_);
     next_in_order_ = 0;
   }
-  const double rate = LearningRate(config_, iteration_);
-  adam_.gradient_scale = 1.0F / static_cast<float>(config_.batch);
-  adam_.rate = static_cast<float>(rate);
-  adam_.decay = static_cast<float>(rate * config_.weight_decay);
-  adam_.momentum_correction = static_cast<float>(1.0 / (1.0 - std::pow(kMomentum, iteration_ + 1)));
-  adam_.variance_correction =
-      static_cast<float>(1.0 / (1.0 - std::pow(kVarianceMomentum, iteration_ + 1)));
+  const double share = RateShare(config_, iteration_);
+  step_ = {.iteration = iteration_,
+           .matrix_rate = share * config_.matrix_learning_rate,
+           .rate = share * config_.learning_rate,
+           .weight_decay = config_.weight_decay};
   loss_config_ = {.focal_px = static_cast<float>(set_.focal_px),
+                  .shape = Shape(config_, iteration_),
                   .tolerance_px = static_cast<float>(Tolerance(config_, iteration_)),
                   .depth_baseline_m = static_cast<float>(config_.depth_baseline_m),
                   .depth_weight = static_cast<float>(config_.depth_weight),
@@ -368,6 +345,7 @@ Result<void> HeadTrainerConfig::Validate() const {
        {Rule{"iterations", iterations, 1, 1e7},
         Rule{"batch", batch, kTrainerShards, 1 << 20},
         Rule{"learning_rate", learning_rate, 1e-8, 1.0},
+        Rule{"matrix_learning_rate", matrix_learning_rate, 1e-8, 1.0},
         Rule{"warm_up", warm_up, 1e-6, 0.999},
         Rule{"weight_decay", weight_decay, 0.0, 1.0},
         Rule{"initial_tolerance_px", initial_tolerance_px, 1e-3, 1e4},
@@ -398,8 +376,10 @@ Result<Head> TrainHead(const TrainingSet& set,
       config.precision == Precision::kFastest ? FastestPrecision() : config.precision;
   try {
     omp_set_num_threads(1);  // products are made for one thread each
-    if (precision == Precision::kBfloat16) return Trainer<Bfloat16>(set, config, progress).Run();
-    return Trainer<float>(set, config, progress).Run();
+    if (precision == Precision::kBfloat16) {
+      return Trainer<Bfloat16>(set, config, precision, progress).Run();
+    }
+    return Trainer<float>(set, config, precision, progress).Run();
   } catch (const dnnl::error& error) {
     return Error{ErrorKind::kInternal, fmt::format("training a head: {}", error.what())};
   }

@@ -14,9 +14,10 @@ namespace relocd {
 struct HeadTrainerConfig {
   HeadShape shape;
   int iterations = 5000;
-  int batch = 4096;             ///< A multiple of kTrainerShards.
-  double learning_rate = 3e-3;  ///< The highest of the one cycle.
-  double warm_up = 0.1;         ///< Share of the iterations until it is reached.
+  int batch = 4096;                    ///< A multiple of kTrainerShards.
+  double matrix_learning_rate = 0.02;  ///< Of hidden layers; the highest of the one cycle.
+  double learning_rate = 6e-3;         ///< Of biases and the last layer, likewise.
+  double warm_up = 0.1;                ///< Share of the iterations until it is reached.
   double weight_decay = 0.01;
   double initial_tolerance_px = 50.0;  ///< Larger errors hardly pull, at the beginning,
   double final_tolerance_px = 1.5;     ///< and at the end.
@@ -48,11 +49,11 @@ struct TrainingProgress {
 ///
 /// Follows the published idea of scene-coordinate regression on a shuffled buffer of frozen
 /// features (Brachmann et al., "Accelerated Coordinate Encoding", 2023, and "DSAC*", 2021): L1
-/// reprojection error, squashed by a tanh whose width shrinks during training, and for points that
-/// are behind the camera or far off the distance to a point at the known or typical depth. Where a
-/// depth was measured, its error counts too, as disparity.
+/// reprojection error, squashed by a logarithm and later by a tanh, whose width shrinks during
+/// training, and for points that are behind the camera or far off the distance to a point at the
+/// known or typical depth. Where a depth was measured, its error counts too, as disparity.
 ///
-/// The network, its derivatives and AdamW are written out here; oneDNN multiplies the matrices.
+/// The network and its derivatives are written out here; oneDNN multiplies the matrices.
 /// @return kInvalidInput for a bad configuration or an empty set.
 Result<Head> TrainHead(const TrainingSet& set,
                        const HeadTrainerConfig& config,

@@ -27,9 +27,13 @@ struct Squashed {
   float slope = 0.0F;
 };
 
-Squashed Squash(float error, float tolerance) {
-  const float squashed = std::tanh(error / tolerance);
-  return {tolerance * squashed, 1.0F - squashed * squashed};
+Squashed Squash(float error, const SceneLossConfig& config) {
+  const float ratio = error / config.tolerance_px;
+  if (config.shape == RobustShape::kLogarithm) {
+    return {config.tolerance_px * std::log1p(ratio), 1.0F / (1.0F + ratio)};
+  }
+  const float squashed = std::tanh(ratio);
+  return {config.tolerance_px * squashed, 1.0F - squashed * squashed};
 }
 
 }  // namespace
@@ -62,7 +66,7 @@ SceneLoss EvaluateSceneLoss(const SceneLossConfig& config,
   Eigen::Vector3f d_p_CP;  // d loss / d p_CP
   float error_disparity = 0.0F;
   if (result.valid) {
-    const Squashed reprojection = Squash(result.error_px, config.tolerance_px);
+    const Squashed reprojection = Squash(result.error_px, config);
     result.loss = reprojection.value;
     const float d_x = config.focal_px * reprojection.slope * Sign(error_u);
     const float d_y = config.focal_px * reprojection.slope * Sign(error_v);
@@ -70,7 +74,7 @@ SceneLoss EvaluateSceneLoss(const SceneLossConfig& config,
     if (target.inverse_depth > 0.0F) {
       const float disparity_per_inverse_depth = config.focal_px * config.depth_baseline_m;
       error_disparity = disparity_per_inverse_depth * (inverse_z - target.inverse_depth);
-      const Squashed depth = Squash(std::abs(error_disparity), config.tolerance_px);
+      const Squashed depth = Squash(std::abs(error_disparity), config);
       result.loss += config.depth_weight * depth.value;
       d_p_CP.z() -= config.depth_weight * depth.slope * Sign(error_disparity) *
                     disparity_per_inverse_depth * inverse_z * inverse_z;

@@ -11,9 +11,16 @@
 
 namespace relocd {
 
+/// How an error counts that is larger than the tolerance.
+enum class RobustShape {
+  kLogarithm,  ///< Less and less, but it never stops to pull: for points that are still far off.
+  kTanh,       ///< Hardly at all: for the end, when what is still far off will stay so.
+};
+
 /// What the loss of a cell depends on, besides the network's output and the cell's target.
 struct SceneLossConfig {
   float focal_px = 0.0F;
+  RobustShape shape = RobustShape::kTanh;
   float tolerance_px = 0.0F;
   float depth_baseline_m = 0.0F;
   float depth_weight = 0.0F;

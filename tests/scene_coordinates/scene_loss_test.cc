@@ -13,8 +13,9 @@ namespace {
 
 using Output = std::array<float, kHeadOutputs>;
 
-SceneLossConfig TestConfig() {
+SceneLossConfig TestConfig(RobustShape shape = RobustShape::kTanh) {
   SceneLossConfig config;
+  config.shape = shape;
   config.focal_px = 500.0F;
   config.tolerance_px = 40.0F;
   config.depth_baseline_m = 1.0F;
@@ -28,13 +29,14 @@ SceneLossConfig TestConfig() {
 /// A camera at the origin that looks along W's z: then p_C = 20 m * output / w.
 const LossCamera kCamera{Eigen::Matrix3f::Identity(), Eigen::Vector3f::Zero()};
 
-float LossAt(const TrainingTarget& target, const Output& output) {
-  return EvaluateSceneLoss(TestConfig(), kCamera, target, output).loss;
-}
-
 /// The derivatives of x, y, z and w by central differences.
-void ExpectGradientAgreesWithDifferences(const TrainingTarget& target, const Output& output) {
-  const SceneLoss loss = EvaluateSceneLoss(TestConfig(), kCamera, target, output);
+void ExpectGradientAgreesWithDifferences(const SceneLossConfig& config,
+                                         const TrainingTarget& target,
+                                         const Output& output) {
+  const auto loss_at = [&](const Output& at) {
+    return EvaluateSceneLoss(config, kCamera, target, at).loss;
+  };
+  const SceneLoss loss = EvaluateSceneLoss(config, kCamera, target, output);
   double scale = 1.0;
   for (std::size_t i = 0; i < 4; ++i)
     scale = std::max(scale, std::abs(double{loss.gradient[i]}));
@@ -44,7 +46,7 @@ void ExpectGradientAgreesWithDifferences(const TrainingTarget& target, const Out
     Output down = output;
     up[i] += kStep;
     down[i] -= kStep;
-    const double difference = (LossAt(target, up) - LossAt(target, down)) / (2.0 * kStep);
+    const double difference = (loss_at(up) - loss_at(down)) / (2.0 * kStep);
     EXPECT_NEAR(loss.gradient[i], difference, 0.03 * scale) << "output " << i;
   }
 }
@@ -82,8 +84,10 @@ TEST(SceneLossTest, GradientAgreesWithDifferences) {
                            depth * factor,
                            raw,
                            0.0F};
-    ASSERT_TRUE(EvaluateSceneLoss(TestConfig(), kCamera, target, output).valid);
-    ExpectGradientAgreesWithDifferences(target, output);
+    const SceneLossConfig config =
+        TestConfig(trial % 4 < 2 ? RobustShape::kTanh : RobustShape::kLogarithm);
+    ASSERT_TRUE(EvaluateSceneLoss(config, kCamera, target, output).valid);
+    ExpectGradientAgreesWithDifferences(config, target, output);
   }
 }
 
@@ -94,7 +98,7 @@ TEST(SceneLossTest, PointsBehindTheCameraArePulledInFrontOfIt) {
   EXPECT_FALSE(loss.valid);
   EXPECT_LT(loss.gradient[2], 0.0F);
   EXPECT_GT(loss.gradient[4], 0.0F);  // be less confident
-  ExpectGradientAgreesWithDifferences(target, output);
+  ExpectGradientAgreesWithDifferences(TestConfig(), target, output);
 }
 
 TEST(SceneLossTest, LargeErrorsHardlyPullOnceTheToleranceIsSmall) {
@@ -106,6 +110,10 @@ TEST(SceneLossTest, LargeErrorsHardlyPullOnceTheToleranceIsSmall) {
   EXPECT_TRUE(loss.valid);
   EXPECT_NEAR(loss.loss, 1.0F, 1e-3F);
   EXPECT_NEAR(loss.gradient[0], 0.0F, 1e-3F);
+  config.shape = RobustShape::kLogarithm;
+  const SceneLoss pulled = EvaluateSceneLoss(config, kCamera, target, output);
+  EXPECT_GT(pulled.loss, 3.0F);
+  EXPECT_GT(pulled.gradient[0], 10.0F) << "until then they do";
 }
 
 TEST(SceneLossTest, TheCameraIsPlacedRelativeToTheCentre) {
