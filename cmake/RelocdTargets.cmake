@@ -48,7 +48,7 @@ function(relocd_add_daemon name)
   target_link_libraries(${name}_node PUBLIC ${arg_DEPENDS} PRIVATE relocd_build_flags)
   add_executable(${name} main.cc)
   target_link_libraries(${name} PRIVATE ${name}_node relocd_daemon relocd_build_flags)
-  install(TARGETS ${name})
+  install(TARGETS ${name} COMPONENT relocd)
 endfunction()
 
 # relocd_add_tool(<verb> [DEPENDS ...]): tools/reloc_<verb>.cc as the executable reloc-<verb>.
@@ -58,7 +58,8 @@ function(relocd_add_tool verb)
   add_executable(reloc-${verb} reloc_${file}.cc ${arg_SOURCES})
   target_include_directories(reloc-${verb} PRIVATE ${PROJECT_SOURCE_DIR}/tools)
   target_link_libraries(reloc-${verb} PRIVATE ${arg_DEPENDS} CLI11::CLI11 relocd_build_flags)
-  install(TARGETS reloc-${verb})
+  install(TARGETS reloc-${verb} COMPONENT relocd-tools)
+  set_property(GLOBAL APPEND PROPERTY RELOCD_TOOLS reloc-${verb})  # for the manual pages
 endfunction()
 
 # relocd_add_tests(<folder> SOURCES a_test.cc ... [DEPENDS ...]): one test binary a folder of tests/.

@@ -79,3 +79,44 @@ def feed_camera(device="/dev/video0", pixel_format="MJPG"):
         return f"'{pixel_format}'" in told.stdout
     wait_until(is_camera, f"{device} is a camera of {pixel_format}")
     return player
+
+
+def packages():
+    """The Debian packages by name."""
+    return {path.name.split("_")[0]: path for path in (BUILD / "packages").glob("*.deb")}
+
+
+def install(*names):
+    """Installs packages of ours as an operator does; this machine has all that they depend on."""
+    # In a container, as these tests' machine may be one, a policy keeps services from being started.
+    pathlib.Path("/usr/sbin/policy-rc.d").unlink(missing_ok=True)
+    dpkg("-i", *(packages()[name] for name in names))
+    start_udev()
+
+
+def dpkg(*arguments):
+    """As apt calls it where nobody is asked: an edited config is kept. Without the triggers of others, which index all manual pages anew."""
+    run("dpkg", "--no-triggers", "--force-confold", "--force-confdef", *arguments, stdout=subprocess.DEVNULL)
+
+
+def start_udev():
+    """The device manager, which the guest does without until rules are wanted: it takes a second."""
+    for mask in pathlib.Path("/run/systemd/system").glob("systemd-udevd*"):
+        mask.unlink()
+    run("systemctl", "daemon-reload")
+    run("systemctl", "start", "systemd-udevd.service")
+    run("udevadm", "trigger", "--action=add", "--subsystem-match=video4linux", "--settle")
+
+
+def service(name, unit="relocd"):
+    """A property of a unit."""
+    return output_of("systemctl", "show", unit, "-p", name, "--value").strip()
+
+
+def journal(unit="relocd"):
+    return output_of("journalctl", "--no-pager", "-o", "cat", "-u", unit)
+
+
+def make_can(name="can0"):
+    run("ip", "link", "add", "dev", name, "type", "vcan")
+    run("ip", "link", "set", name, "up")

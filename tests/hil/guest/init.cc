@@ -4,11 +4,8 @@
 // and nothing reaches this machine, mounts hil.share=DIR on /hil, where writing does reach it, and
 // becomes systemd.
 
-#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/mount.h>
 #include <sys/reboot.h>
@@ -18,6 +15,10 @@
 
 #include <fstream>
 #include <string>
+
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 namespace {
 

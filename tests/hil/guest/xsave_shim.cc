@@ -5,9 +5,7 @@
 // is above 2696 bytes nothing in the guest can use, so zeros are written there. Elsewhere this
 // does nothing.
 
-#include <elf.h>
 #include <errno.h>
-#include <stdarg.h>
 #include <sys/ptrace.h>
 #include <sys/syscall.h>
 #include <sys/uio.h>
@@ -15,6 +13,9 @@
 
 #include <algorithm>
 #include <array>
+
+#include <elf.h>
+#include <stdarg.h>
 
 namespace {
 
