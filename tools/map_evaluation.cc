@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -23,12 +24,20 @@ Pose3 TruthInMap(const SceneMap& map, const DatasetFrame& frame) {
   return Pose3(map.R_WD, Eigen::Vector3d::Zero()) * frame.X_WC;
 }
 
-Result<FrameLocalization> LocalizeFrame(MapLocalizer& localizer, const DatasetFrame& frame) {
+using ImageChange = std::function<GrayImage(const GrayImage& image, int index)>;
+
+Result<FrameLocalization> LocalizeFrame(MapLocalizer& localizer,
+                                        const DatasetFrame& frame,
+                                        const ImageChange& change) {
   const auto bytes = ReadFile(frame.image_path);
   if (!bytes) return bytes.error();
-  const auto start = std::chrono::steady_clock::now();
-  const auto image = DecodeJpegToGray(AsBytes(*bytes));
+  auto start = std::chrono::steady_clock::now();
+  auto image = DecodeJpegToGray(AsBytes(*bytes));
   if (!image) return Error(image.error()).WithContext(frame.image_path);
+  if (change) {
+    *image = change(*image, frame.index);
+    start = std::chrono::steady_clock::now();
+  }
   const auto seed = static_cast<std::uint64_t>(frame.index);
   const auto localization = localizer.LocalizeAnywhere(*image, seed);
   if (!localization) return Error(localization.error()).WithContext(frame.image_path);
@@ -44,7 +53,8 @@ Result<FrameLocalization> LocalizeFrame(MapLocalizer& localizer, const DatasetFr
 
 Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
                                                       const std::vector<DatasetFrame>& frames,
-                                                      int threads) {
+                                                      int threads,
+                                                      const ImageChange& change) {
   std::vector<FrameLocalization> results(frames.size());
   std::vector<std::optional<Error>> errors(static_cast<std::size_t>(threads));
   std::atomic<std::size_t> next = 0;
@@ -55,7 +65,7 @@ Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
       return;
     }
     for (std::size_t index = next++; index < frames.size(); index = next++) {
-      auto result = LocalizeFrame(**localizer, frames[index]);
+      auto result = LocalizeFrame(**localizer, frames[index], change);
       if (!result) {
         error = std::move(result).error();
         return;
@@ -87,10 +97,40 @@ double Quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+namespace {
+
+/// The place of each value among all, from 0.
+std::vector<double> Ranks(const std::vector<double>& values) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&values](std::size_t index) { return values[index]; });
+  std::vector<double> ranks(values.size());
+  for (std::size_t rank = 0; rank < order.size(); ++rank) {
+    ranks[order[rank]] = static_cast<double>(rank);
+  }
+  return ranks;
+}
+
+/// Spearman's; equal values have neighbouring ranks, which is right enough for real numbers.
+double RankCorrelation(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto n = static_cast<double>(a.size());
+  if (a.size() < 3) return 0.0;
+  const std::vector<double> ranks_a = Ranks(a);
+  const std::vector<double> ranks_b = Ranks(b);
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    squares += (ranks_a[i] - ranks_b[i]) * (ranks_a[i] - ranks_b[i]);
+  }
+  return 1.0 - 6.0 * squares / (n * (n * n - 1.0));
+}
+
+}  // namespace
+
 PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalization>& localizations) {
   PoseErrors errors;
   errors.frames = localizations.size();
   std::vector<double> metres;
+  std::vector<double> sigmas_m;
   std::vector<double> radians;
   std::vector<double> milliseconds;
   std::size_t near = 0;
@@ -102,7 +142,10 @@ PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalizatio
     const Pose3& X_WC = localization.pose.X_WC;
     metres.push_back((X_WC.translation() - X_WC_true.translation()).norm());
     radians.push_back(AngleBetween(X_WC.rotation(), X_WC_true.rotation()));
+    const Matrix6d& covariance = localization.pose.covariance;
+    sigmas_m.push_back(std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
     if (metres.back() < 1.0) ++near;
+    if (metres.back() > 10.0) ++errors.wrong_10m;
     const double distance =
         SquaredMahalanobis(PoseError(map, localization), localization.pose.covariance);
     if (distance < kChiSquared95Dof6) ++inside;
@@ -113,6 +156,7 @@ PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalizatio
     errors.p99_ms = Quantile(milliseconds, 0.99);
   }
   if (metres.empty()) return errors;
+  errors.sigma_rank_correlation = RankCorrelation(sigmas_m, metres);
   errors.median_m = Quantile(metres, 0.5);
   errors.p95_m = Quantile(metres, 0.95);
   errors.median_rad = Quantile(radians, 0.5);

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "camera/dataset.h"
+#include "camera/image.h"
 #include "core/result.h"
 #include "geometry/pose3.h"
 #include "relocalization/camera_pose_estimator.h"
@@ -24,9 +26,12 @@ struct FrameLocalization {
 /// are tried, and the pose with the most support is kept.
 ///
 /// @param threads  each works on frames of its own; the result does not depend on them.
-Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
-                                                      const std::vector<DatasetFrame>& frames,
-                                                      int threads);
+/// @param change   what is done to each image first, if anything; called by several threads.
+Result<std::vector<FrameLocalization>> LocalizeFrames(
+    const SceneMap& map,
+    const std::vector<DatasetFrame>& frames,
+    int threads,
+    const std::function<GrayImage(const GrayImage& image, int index)>& change = {});
 
 /// Errors against the data set's poses.
 struct PoseErrors {
@@ -38,6 +43,9 @@ struct PoseErrors {
   double within_1m = 0.0;  ///< Share of all frames.
   double within_95 =
       0.0;  ///< Share of localized frames inside the 95 % region of their covariance.
+  /// Spearman's correlation of the reported position sigma and the error, in [-1, 1].
+  double sigma_rank_correlation = 0.0;
+  std::size_t wrong_10m = 0;  ///< Localized frames that are off by more than that.
   double median_ms = 0.0;
   double p99_ms = 0.0;
 };

@@ -14,6 +14,7 @@
 #include "core/exit_code.h"
 #include "core/file.h"
 #include "map_dataset.h"
+#include "map_disturbance.h"
 #include "map_evaluation.h"
 #include "map_input.h"
 #include "map_training.h"
@@ -68,14 +69,17 @@ std::string FormatPoses(const SceneMap& map, const std::vector<FrameLocalization
 std::string FormatErrors(const PoseErrors& errors) {
   return fmt::format(
       "localized {} of {} frames: median {:.3f} m, {:.3f} deg; p95 {:.3f} m; within 1 m {:.1f} %; "
-      "inside the reported 95 % region {:.0f} %; {:.1f} ms a frame, p99 {:.1f} ms\n",
+      "off by > 10 m {}; inside the reported 95 % region {:.0f} %; rank correlation of sigma and "
+      "error {:.2f}; {:.1f} ms a frame, p99 {:.1f} ms\n",
       errors.localized,
       errors.frames,
       errors.median_m,
       errors.median_rad * kDegrees,
       errors.p95_m,
       100.0 * errors.within_1m,
+      errors.wrong_10m,
       100.0 * errors.within_95,
+      errors.sigma_rank_correlation,
       errors.median_ms,
       errors.p99_ms);
 }
@@ -171,15 +175,25 @@ struct LocalizeCommand {
   FrameSelection frames;
   std::string map;
   std::string out;
+  std::string disturbance = "none";
+  bool fits_size = false;
   int threads = 1;
 };
 
 Result<int> Localize(const LocalizeCommand& command) {
+  const auto disturbance = ParseDisturbance(command.disturbance);
+  if (!disturbance) return disturbance.error();
   const auto map = ReadMap(command.map);
   if (!map) return map.error();
   const auto selected = SelectFrames(command.frames, SplitPart::kTest);
   if (!selected) return selected.error();
-  const auto localizations = LocalizeFrames(*map, selected->dataset.frames, command.threads);
+  const auto change = [&](const GrayImage& image, int index) {
+    const GrayImage fitted =
+        command.fits_size ? FitSize(image, map->camera.width, map->camera.height) : image;
+    return Disturb(fitted, *disturbance, static_cast<std::uint64_t>(index));
+  };
+  const auto localizations =
+      LocalizeFrames(*map, selected->dataset.frames, command.threads, change);
   if (!localizations) return localizations.error();
   if (auto written = WriteFileAtomically(command.out, FormatPoses(*map, *localizations));
       !written) {
@@ -346,7 +360,15 @@ int Main(int argc, char** argv) {
       ->required();
   AddFrameOptions(*localize_app, localize.frames, "file of the split: its test rows are used");
   localize_app->add_option("--out", localize.out, "poses.csv to write")->required();
-  localize_app->add_option("--threads", localize.threads, "default 1");
+  localize_app->add_option(
+      "--threads", localize.threads, "default 1; each has an image of its own");
+  localize_app->add_option(
+      "--disturb",
+      localize.disturbance,
+      "gamma, dark, blur, noise or occluders: what is done to the images first");
+  localize_app->add_flag("--fit-size",
+                         localize.fits_size,
+                         "cut and resize images of another camera, to see that they are not found");
 
   std::string map_path;
   bool json = false;
