@@ -55,8 +55,13 @@ std::string NameOfStatus(const localization_t& message) {
 
 /// As `reloc map localize` writes it.
 std::string NameOfStatus(const camera_pose_t& message) {
-  constexpr std::array<std::string_view, 6> kNames{
-      "ok", "bad_image", "wrong_size", "no_hypothesis", "low_confidence", "degenerate"};
+  constexpr std::array<std::string_view, 6> kNames{"ok",
+                                                   "bad_image",
+                                                   "wrong_size",
+                                                   "no_hypothesis",
+                                                   "low_confidence",
+                                                   "degenerate",
+                                                   "off_route"};
   const auto status = static_cast<std::size_t>(message.status);
   return status < kNames.size() ? std::string(kNames.at(status))
                                 : fmt::format("unknown ({})", message.status);

@@ -47,6 +47,8 @@ std::int32_t StatusOf(CameraPoseStatus status) {
       return camera_pose_t::STATUS_LOW_CONFIDENCE;
     case CameraPoseStatus::kDegenerate:
       return camera_pose_t::STATUS_DEGENERATE;
+    case CameraPoseStatus::kOffRoute:
+      return camera_pose_t::STATUS_OFF_ROUTE;
   }
   return camera_pose_t::STATUS_NO_HYPOTHESIS;
 }
@@ -65,6 +67,9 @@ std::string Explain(const CameraPoseResult& result) {
                          result.correspondences);
     case CameraPoseStatus::kDegenerate:
       return fmt::format("the {} scene coordinates that agree do not determine a pose",
+                         result.inliers);
+    case CameraPoseStatus::kOffRoute:
+      return fmt::format("{} scene coordinates agree on a pose far from where the map was learned",
                          result.inliers);
   }
   return "";
@@ -249,6 +254,9 @@ void InferenceNode::Count(const camera_pose_t& answer, MonotonicTime now) {
     case camera_pose_t::STATUS_LOW_CONFIDENCE:
       ++counters_.low_confidence;
       return;
+    case camera_pose_t::STATUS_OFF_ROUTE:
+      ++counters_.off_route;
+      return;
     default:
       ++counters_.degenerate;
   }
@@ -286,6 +294,7 @@ NodeStatus InferenceNode::Status(const ClockReading& now) const {
   add("no_hypothesis", counters_.no_hypothesis);
   add("low_confidence", counters_.low_confidence);
   add("degenerate", counters_.degenerate);
+  add("off_route", counters_.off_route);
   add("poses", counters_.poses);
   add("regions_tried", counters_.regions_tried);
   add("priors", counters_.priors);

@@ -35,6 +35,7 @@ class InferenceNode {
     std::int64_t no_hypothesis = 0;
     std::int64_t low_confidence = 0;
     std::int64_t degenerate = 0;
+    std::int64_t off_route = 0;
     std::int64_t poses = 0;
     std::int64_t regions_tried = 0;  ///< Of the map, on all images together.
     std::int64_t priors = 0;         ///< Images for which it was known where to look first.

@@ -156,6 +156,8 @@ std::string_view Name(CameraPoseStatus status) {
       return "low_confidence";
     case CameraPoseStatus::kDegenerate:
       return "degenerate";
+    case CameraPoseStatus::kOffRoute:
+      return "off_route";
   }
   return "unknown";
 }

@@ -66,9 +66,10 @@ enum class CameraPoseStatus {
   kNoHypothesis,   ///< No minimal set gave a pose that a fourth point agrees with.
   kLowConfidence,  ///< The best pose has too little support.
   kDegenerate,     ///< What supports the best pose does not determine it.
+  kOffRoute,       ///< The best pose is far from where the map was learned.
 };
 
-/// `ok`, `no_hypothesis`, `low_confidence`, `degenerate`, as in files and logs.
+/// `ok`, `no_hypothesis`, `low_confidence`, `degenerate`, `off_route`, as in files and logs.
 std::string_view Name(CameraPoseStatus status);
 
 struct CameraPoseResult {

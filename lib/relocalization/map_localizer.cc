@@ -1,8 +1,11 @@
 #include "relocalization/map_localizer.h"
 
-#include <limits>
+#include <cmath>
+#include <numbers>
 #include <span>
 #include <utility>
+
+#include "relocalization/training_places.h"
 
 namespace relocd {
 namespace {
@@ -49,18 +52,13 @@ Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Load(const InferenceConfig& 
 }
 
 Pose3 MapLocalizer::AtTrainedHeight(const Pose3& X_WC) const {
-  double least = std::numeric_limits<double>::infinity();
-  double height_m = X_WC.translation().z();
+  NearestPlace nearest;
   for (const MapRegion& region : map_.regions) {
-    for (const TrainingPose& pose : region.training_poses) {
-      const double distance =
-          (pose.p_WC.cast<double>() - X_WC.translation()).head<2>().squaredNorm();
-      if (distance >= least) continue;
-      least = distance;
-      height_m = pose.p_WC.z();
-    }
+    const NearestPlace of_region = FindNearestPlace(region, X_WC, std::numbers::pi);
+    if (of_region.distance_m < nearest.distance_m) nearest = of_region;
   }
-  return {X_WC.rotation(), {X_WC.translation().x(), X_WC.translation().y(), height_m}};
+  if (std::isinf(nearest.distance_m)) return X_WC;
+  return {X_WC.rotation(), {X_WC.translation().x(), X_WC.translation().y(), nearest.height_m}};
 }
 
 void MapLocalizer::TryRegion(std::size_t region,
@@ -77,7 +75,10 @@ void MapLocalizer::TryRegion(std::size_t region,
   }
   CameraPoseOptions options = options_;
   options.calibration = CalibrationOf(map_.regions[region].calibration);
-  const CameraPoseResult pose = EstimateCameraPose(correspondences_, camera_, options, prior, seed);
+  CameraPoseResult pose = EstimateCameraPose(correspondences_, camera_, options, prior, seed);
+  if (pose.status == CameraPoseStatus::kOk && !IsNearTraining(map_.regions[region], pose.X_WC)) {
+    pose.status = CameraPoseStatus::kOffRoute;
+  }
   localization.head_time += predicted - start;
   localization.pose_time += clock() - predicted;
   ++localization.regions_tried;

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <tuple>
 
 #include "core/check.h"
+#include "relocalization/training_places.h"
 
 namespace relocd {
 namespace {
@@ -20,19 +20,11 @@ constexpr double kSigmas = 3.0;
 /// How far the prior is from the nearest training pose of a region that looks its way; infinite if
 /// there is none within reach.
 double Distance(const MapRegion& region, const CameraPrior& prior) {
-  const double reach_m = kReachM + kSigmas * prior.sigma_m;
-  const double reach_rad = kReachRad + kSigmas * prior.sigma_rad;
-  const Eigen::Vector3d forward_W = prior.X_WC.R().col(2);
-  const double heading_rad = std::atan2(forward_W.y(), forward_W.x());
-  double least = std::numeric_limits<double>::infinity();
-  for (const TrainingPose& pose : region.training_poses) {
-    const double turn_rad =
-        std::abs(std::remainder(pose.heading_rad - heading_rad, 2.0 * std::numbers::pi));
-    const double distance_m =
-        (pose.p_WC.cast<double>() - prior.X_WC.translation()).head<2>().norm();
-    if (turn_rad < reach_rad && distance_m < reach_m) least = std::min(least, distance_m);
-  }
-  return least;
+  const NearestPlace nearest =
+      FindNearestPlace(region, prior.X_WC, kReachRad + kSigmas * prior.sigma_rad);
+  return nearest.distance_m < kReachM + kSigmas * prior.sigma_m
+             ? nearest.distance_m
+             : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace

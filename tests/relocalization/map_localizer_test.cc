@@ -127,6 +127,29 @@ TEST(MapLocalizerTest, LooksWhereTheCameraIsExpected) {
   EXPECT_EQ(localizer->Localize(image, prior, 2, TickingClock())->regions_tried, 1);
 }
 
+TEST(MapLocalizerTest, APoseFarFromWhereTheRegionWasLearnedIsNone) {
+  const Eigen::Vector3f here = kPose.translation().cast<float>();
+  const struct {
+    const char* what;
+    TrainingPose learned;
+    CameraPoseStatus expected;
+  } cases[] = {
+      {"beside", {here + Eigen::Vector3f(20.0F, 0.0F, 2.0F), 0.5F}, CameraPoseStatus::kOk},
+      {"far", {here + Eigen::Vector3f(20.0F, 20.0F, 0.0F), 0.0F}, CameraPoseStatus::kOffRoute},
+      {"above", {here - Eigen::Vector3f(0.0F, 0.0F, 12.0F), 0.0F}, CameraPoseStatus::kOffRoute},
+      {"other way", {here, 3.0F}, CameraPoseStatus::kOffRoute}};
+  for (const auto& [what, learned, expected] : cases) {
+    SceneMap map = MakeMap();
+    map.regions.front().training_poses = {learned};
+    const auto localization =
+        MakeLocalizer(std::move(map))
+            ->Localize(MakeTexturedImage(kWidth, kHeight, 1), std::nullopt, 1, TickingClock());
+    ASSERT_TRUE(localization);
+    EXPECT_EQ(localization->pose.status, expected) << what;
+    EXPECT_EQ(localization->region, expected == CameraPoseStatus::kOk ? 0 : -1) << what;
+  }
+}
+
 TEST(MapLocalizerTest, AppliesTheCalibrationOfTheRegion) {
   SceneMap map = MakeMap();
   map.regions.front().calibration.confidence_threshold = 1.0;
