@@ -93,6 +93,14 @@ GrayImage Disturb(const GrayImage& image, Disturbance disturbance, std::uint64_t
   return out;
 }
 
+GrayImage Mirror(const GrayImage& image) {
+  GrayImage mirrored = image;
+  for (auto row = mirrored.pixels.begin(); row != mirrored.pixels.end(); row += image.width) {
+    std::reverse(row, row + image.width);
+  }
+  return mirrored;
+}
+
 GrayImage FitSize(const GrayImage& image, int width, int height) {
   const double scale = std::min(static_cast<double>(image.width) / width,
                                 static_cast<double>(image.height) / height);

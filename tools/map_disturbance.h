@@ -27,6 +27,9 @@ Result<Disturbance> ParseDisturbance(const std::string& name);
 /// @param seed  of noise and of where rectangles are.
 GrayImage Disturb(const GrayImage& image, Disturbance disturbance, std::uint64_t seed);
 
+/// Left and right exchanged.
+GrayImage Mirror(const GrayImage& image);
+
 /// The largest part in the middle that has the wanted sides' ratio, resized.
 GrayImage FitSize(const GrayImage& image, int width, int height);
 

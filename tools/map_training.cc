@@ -20,7 +20,7 @@
 #include "camera/jpeg.h"
 #include "camera/pinhole_camera.h"
 #include "features/gradient_histograms.h"
-#include "geometry/covariance.h"
+#include "map_calibration.h"
 #include "map_route.h"
 #include "progress_line.h"
 
@@ -228,49 +228,6 @@ Result<FeatureWhitening> FitRouteWhitening(const std::vector<RouteFrame>& route,
   RoundAsStored(whitening->mean);
   RoundAsStored(whitening->basis);
   return whitening;
-}
-
-/// How much the covariances must grow, and from which confidence poses are right, by frames that
-/// the region was not trained on.
-RegionCalibration Calibrate(const SceneMap& map, const std::vector<FrameLocalization>& held_out) {
-  // Errors of neighbouring frames on the same stretch are alike, so that few frames say less than
-  // they seem to: the factor is taken where nine of ten frames are inside their 90 % region.
-  constexpr double kShare = 0.9;
-  constexpr double kChiSquared90Dof6 = 10.644640675668422;
-  // Images of other places have a confidence of about 0.01; in poor light it falls to a tenth.
-  constexpr double kThresholdShare = 0.1;
-  constexpr double kLeastThreshold = 0.03;
-  constexpr double kRightM = 2.0;
-  RegionCalibration calibration;
-  std::vector<double> ratios;
-  std::vector<double> confidences;
-  for (const FrameLocalization& localization : held_out) {
-    if (localization.pose.status != CameraPoseStatus::kOk) continue;
-    const Vector6d error = PoseError(map, localization);
-    ratios.push_back(SquaredMahalanobis(error, localization.pose.covariance) / kChiSquared90Dof6);
-    if (error.head<3>().norm() < kRightM) confidences.push_back(localization.pose.confidence);
-  }
-  if (ratios.empty() || confidences.empty()) return calibration;
-  calibration.covariance_factor = std::clamp(Quantile(ratios, kShare), 1.0, 1e6);
-  calibration.confidence_threshold =
-      std::max(kLeastThreshold, kThresholdShare * Quantile(confidences, 0.05));
-  return calibration;
-}
-
-Result<void> CalibrateRegions(const std::vector<DatasetFrame>& held_out,
-                              int threads,
-                              SceneMap& map) {
-  const auto raw = LocalizeFrames(map, held_out, threads);
-  if (!raw) return raw.error();
-  for (std::size_t index = 0; index < map.regions.size(); ++index) {
-    std::vector<FrameLocalization> of_region;
-    std::copy_if(raw->begin(),
-                 raw->end(),
-                 std::back_inserter(of_region),
-                 [&](const FrameLocalization& result) { return result.region == index; });
-    map.regions[index].calibration = Calibrate(map, of_region);
-  }
-  return {};
 }
 
 }  // namespace

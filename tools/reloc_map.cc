@@ -13,10 +13,12 @@
 
 #include "core/exit_code.h"
 #include "core/file.h"
+#include "map_calibration.h"
 #include "map_dataset.h"
 #include "map_disturbance.h"
 #include "map_evaluation.h"
 #include "map_input.h"
+#include "map_route.h"
 #include "map_training.h"
 #include "scene_coordinates/map_file.h"
 
@@ -168,6 +170,34 @@ Result<int> Train(const TrainCommand& command) {
       return written.error();
     }
   }
+  return kExitOk;
+}
+
+struct CalibrateCommand {
+  std::vector<std::string> datasets;
+  FrameSelection frames;  ///< Without the data set.
+  std::string map;
+  std::string out;
+  int held_out_every = MapTrainingOptions{}.held_out_every;
+  int threads = 2;
+};
+
+Result<int> Calibrate(const CalibrateCommand& command) {
+  auto map = ReadMap(command.map);
+  if (!map) return map.error();
+  const auto drives = SelectDrives(command.datasets, command.frames);
+  if (!drives) return drives.error();
+  const auto route = PlaceOnRoute(*drives, command.held_out_every);
+  if (!route) return route.error();
+  std::vector<DatasetFrame> held_out;
+  for (const RouteFrame& frame : *route) {
+    if (frame.is_held_out) held_out.push_back(frame.frame);
+  }
+  if (auto done = CalibrateRegions(held_out, command.threads, *map); !done) return done.error();
+  const auto localizations = LocalizeFrames(*map, held_out, command.threads);
+  if (!localizations) return localizations.error();
+  if (auto written = WriteMap(*map, command.out); !written) return written.error();
+  fmt::print("{}", FormatErrors(MeasureErrors(*map, *localizations)));
   return kExitOk;
 }
 
@@ -353,6 +383,19 @@ int Main(int argc, char** argv) {
   train_app->add_option("--held-out-every", train.options.held_out_every, "default 8");
   train_app->add_option("--region-length", train.options.region_length_m, "default 150 m");
 
+  CalibrateCommand calibrate;
+  auto* calibrate_app = app.add_subcommand(
+      "calibrate", "measure anew how far a map's covariances and confidences can be trusted");
+  calibrate_app->add_option("--map", calibrate.map, "the map file")->required();
+  calibrate_app->add_option("--dataset", calibrate.datasets, "as given to train, in this order")
+      ->required();
+  AddFrameOptions(*calibrate_app, calibrate.frames, "file of the split: its train rows are used");
+  calibrate_app->add_option("--held-out-every",
+                            calibrate.held_out_every,
+                            "as given to train: the frames that it did not learn from");
+  calibrate_app->add_option("--out", calibrate.out, "the map file to write")->required();
+  calibrate_app->add_option("--threads", calibrate.threads, "default 2");
+
   LocalizeCommand localize;
   auto* localize_app = app.add_subcommand("localize", "find the images of a data set in a map");
   localize_app->add_option("--map", localize.map, "the map file")->required();
@@ -383,6 +426,7 @@ int Main(int argc, char** argv) {
   }
   if (check_app->parsed()) return Finish(Check(check));
   if (train_app->parsed()) return Finish(Train(train));
+  if (calibrate_app->parsed()) return Finish(Calibrate(calibrate));
   if (localize_app->parsed()) return Finish(Localize(localize));
   return Finish(Info(map_path, json));
 }

@@ -104,6 +104,15 @@ TEST_F(RelocMapTest, TheNumberOfThreadsDoesNotChangeAMapOfSeveralRegions) {
   EXPECT_THAT(Run("info a.relocmap").output, HasSubstr("region2"));
 }
 
+TEST_F(RelocMapTest, CalibratedOnTheSameFramesAMapStaysAsItIs) {
+  const Outcome trained = Run("train --dataset . --iterations 3 --views 1 --out a.relocmap");
+  ASSERT_EQ(trained.exit_code, kExitOk) << trained.output;
+  const Outcome again = Run("calibrate --map a.relocmap --dataset . --out b.relocmap");
+  ASSERT_EQ(again.exit_code, kExitOk) << again.output;
+  EXPECT_THAT(again.output, HasSubstr("of 1 frames"));
+  EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("b.relocmap")).value());
+}
+
 TEST_F(RelocMapTest, RefusesAMapThatIsMissingOrNone) {
   EXPECT_EQ(Run("info nothing.relocmap").exit_code, kExitConfig);
   folder_.Write("text.relocmap", "this is no map at all");
