@@ -303,6 +303,7 @@ NodeStatus InferenceNode::Status(const ClockReading& now) const {
   status.Add("image_to_pose_p99_ms", age_ms_.Percentile(0.99));
   status.Add("work_p50_ms", work_ms_.Percentile(0.50));
   status.Add("work_p99_ms", work_ms_.Percentile(0.99));
+  status.Add("bfloat16", localizer_->uses_bfloat16() ? 1.0 : 0.0);
   RaiseLevel(now, status);
   return status;
 }

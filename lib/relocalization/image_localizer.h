@@ -40,6 +40,8 @@ class ImageLocalizer {
 
   /// The camera that the map was made for.
   [[nodiscard]] virtual const CameraIntrinsics& camera() const = 0;
+  /// Whether the network runs in bfloat16, where that was found to be faster than float.
+  [[nodiscard]] virtual bool uses_bfloat16() const { return false; }
   /// The sha256 of the map in hexadecimal.
   [[nodiscard]] virtual const std::string& map_id() const = 0;
 

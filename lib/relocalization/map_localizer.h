@@ -30,6 +30,9 @@ class MapLocalizer final : public ImageLocalizer {
 
   [[nodiscard]] const CameraIntrinsics& camera() const override { return map_.camera; }
   [[nodiscard]] const std::string& map_id() const override { return map_.id; }
+  [[nodiscard]] bool uses_bfloat16() const override {
+    return predictor_->precision() == Precision::kBfloat16;
+  }
   [[nodiscard]] const SceneMap& map() const { return map_; }
 
   Result<ImageLocalization> Localize(const GrayImage& image,

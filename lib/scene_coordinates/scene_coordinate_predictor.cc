@@ -1,10 +1,43 @@
 #include "scene_coordinates/scene_coordinate_predictor.h"
 
+#include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "core/check.h"
 
 namespace relocd {
+
+namespace {
+
+/// The least time of a few runs over some cells.
+std::chrono::nanoseconds TimeOf(OnednnLayers& layers) {
+  constexpr std::size_t kRows = 512;
+  constexpr int kRuns = 5;
+  const std::vector<float> in(kRows * static_cast<std::size_t>(layers.inputs()), 0.5F);
+  std::vector<float> out(kRows * static_cast<std::size_t>(layers.outputs()));
+  auto least = std::chrono::nanoseconds::max();
+  for (int run = 0; run < kRuns; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    layers.Run(in, out);
+    least = std::min<std::chrono::nanoseconds>(least, std::chrono::steady_clock::now() - start);
+  }
+  return least;
+}
+
+/// Which precision is the faster one for this head on this CPU. bfloat16 must be clearly faster:
+/// where there is little to choose, the choice should not hang on chance.
+Result<Precision> MeasureFastest(const Head& head, int threads) {
+  constexpr double kClearly = 0.8;
+  if (FastestPrecision() != Precision::kBfloat16) return Precision::kFloat32;
+  auto narrow = OnednnLayers::ForHead(head, Precision::kBfloat16, threads);
+  if (!narrow) return Precision::kFloat32;
+  auto wide = OnednnLayers::ForHead(head, Precision::kFloat32, threads);
+  if (!wide) return std::move(wide).error();
+  return TimeOf(**narrow) < kClearly * TimeOf(**wide) ? Precision::kBfloat16 : Precision::kFloat32;
+}
+
+}  // namespace
 
 Result<std::unique_ptr<SceneCoordinatePredictor>> SceneCoordinatePredictor::Create(
     const SceneMap& map, int threads) {
@@ -15,8 +48,13 @@ Result<std::unique_ptr<SceneCoordinatePredictor>> SceneCoordinatePredictor::Crea
   auto whitening = OnednnLayers::ForWhitening(map.whitening, threads);
   if (!whitening) return std::move(whitening).error();
   predictor->whitening_ = std::move(*whitening);
+  if (!map.regions.empty()) {
+    const auto precision = MeasureFastest(map.regions.front().head, threads);
+    if (!precision) return precision.error();
+    predictor->precision_ = *precision;
+  }
   for (const MapRegion& region : map.regions) {
-    auto head = OnednnLayers::ForHead(region.head, Precision::kFastest, threads);
+    auto head = OnednnLayers::ForHead(region.head, predictor->precision_, threads);
     if (!head) return std::move(head).error();
     predictor->heads_.push_back(std::move(*head));
   }

@@ -29,8 +29,11 @@ struct ScenePrediction {
 /// thread-bound. Borrows the map, which must outlive it.
 class SceneCoordinatePredictor {
  public:
-  /// @param threads  of the matrix products, >= 1.
+  /// The heads run in the precision that is the faster one when it is tried.
+  /// @param threads  of features and matrix products, >= 1.
   static Result<std::unique_ptr<SceneCoordinatePredictor>> Create(const SceneMap& map, int threads);
+
+  [[nodiscard]] Precision precision() const { return precision_; }
 
   /// @return kInvalidInput when the image has not the size of the map's camera.
   Result<void> Extract(const GrayImage& image);
@@ -42,6 +45,7 @@ class SceneCoordinatePredictor {
   explicit SceneCoordinatePredictor(const SceneMap& map) : map_(map) {}
 
   const SceneMap& map_;
+  Precision precision_ = Precision::kFloat32;
   std::unique_ptr<GradientHistograms> extractor_;
   std::unique_ptr<OnednnLayers> whitening_;
   std::vector<std::unique_ptr<OnednnLayers>> heads_;

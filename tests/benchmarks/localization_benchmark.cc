@@ -75,6 +75,21 @@ class Percentiles {
   std::vector<double> ms_;
 };
 
+/// Reading a map of so many regions and making it ready: what inferenced does at its start.
+void BM_LoadMap(benchmark::State& state) {
+  SceneMap map = ShippedMap();
+  const std::vector<MapRegion> regions = map.regions;
+  while (map.regions.size() < static_cast<std::size_t>(state.range(0)))
+    map.regions.insert(map.regions.end(), regions.begin(), regions.end());
+  map.regions.resize(static_cast<std::size_t>(state.range(0)));
+  const std::string bytes = SerializeMap(map);
+  for (auto _ : state) {
+    auto parsed = ParseMap(bytes, "map");
+    benchmark::DoNotOptimize(MapLocalizer::Create(std::move(*parsed), {}));
+  }
+}
+BENCHMARK(BM_LoadMap)->Arg(1)->Arg(5)->Arg(20)->Unit(benchmark::kMillisecond);
+
 void BM_ExtractFeatures(benchmark::State& state) {
   const auto extractor =
       GradientHistograms::Create(ShippedMap().features, static_cast<int>(state.range(0))).value();
@@ -109,14 +124,26 @@ void BM_Localize(benchmark::State& state) {
   Percentiles percentiles;
   std::uint64_t seed = 0;
   int poses = 0;
+  Duration features{};
+  Duration heads{};
+  Duration pose{};
   for (auto _ : state) {
     percentiles.Time([&] {
-      const auto localization = localizer->Localize(
-          picture, prior, seed++, [] { return ReadClocks().monotonic; });
+      const auto localization =
+          localizer->Localize(picture, prior, seed++, [] { return ReadClocks().monotonic; });
       if (localization->region == 0) ++poses;
+      features += localization->features_time;
+      heads += localization->head_time;
+      pose += localization->pose_time;
     });
   }
   percentiles.Report(state);
+  const auto mean_ms = [&state](Duration sum) {
+    return 1e3 * ToSeconds(sum) / static_cast<double>(state.iterations());
+  };
+  state.counters["features_ms"] = mean_ms(features);
+  state.counters["heads_ms"] = mean_ms(heads);
+  state.counters["pose_ms"] = mean_ms(pose);
   state.counters["found"] = static_cast<double>(poses) / static_cast<double>(state.iterations());
 }
 BENCHMARK(BM_Localize)
