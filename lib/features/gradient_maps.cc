@@ -7,8 +7,8 @@
 
 #include "core/check.h"
 
-// The same source is compiled for three instruction sets and chosen when the program starts. Without
-// fused multiply-add (-ffp-contract=off) all give the same bits.
+// The same source is compiled for three instruction sets and chosen when the program starts.
+// Without fused multiply-add (-ffp-contract=off) all give the same bits.
 #define RELOCD_VECTORISED \
   __attribute__((target_clones("default", "arch=x86-64-v3", "arch=x86-64-v4")))
 

@@ -13,7 +13,7 @@ namespace relocd {
 /// How a head is trained. Errors are in working pixels.
 struct HeadTrainerConfig {
   HeadShape shape;
-  int iterations = 5000;
+  int iterations = 3000;
   int batch = 4096;                    ///< A multiple of kTrainerShards.
   double matrix_learning_rate = 0.02;  ///< Of hidden layers; the highest of the one cycle.
   double learning_rate = 6e-3;         ///< Of biases and the last layer, likewise.
