@@ -25,8 +25,9 @@ struct Verb {
 };
 
 /// What is beside this program and not in here is listed too, without a help text.
-constexpr std::array<Verb, 12> kVerbs{{
+constexpr std::array<Verb, 13> kVerbs{{
     {"status", "how the daemons are, and where the robot is"},
+    {"doctor", "what this robot lacks, and the command that mends it"},
     {"check-config", "whether a robot's config is right"},
     {"map", "train a map from a drive, localize images in it, say what is in it"},
     {"can", "the signals of a recorded CAN bus, as the DBC file has them"},
