@@ -55,7 +55,7 @@ std::string NameOfStatus(const localization_t& message) {
 
 /// As `reloc map localize` writes it.
 std::string NameOfStatus(const camera_pose_t& message) {
-  constexpr std::array<std::string_view, 6> kNames{"ok",
+  constexpr std::array<std::string_view, 7> kNames{"ok",
                                                    "bad_image",
                                                    "wrong_size",
                                                    "no_hypothesis",

@@ -98,7 +98,7 @@ Matrix6d CalibratedCovariance(const Matrix6d& covariance,
   Vector6d floor;
   floor << Eigen::Vector3d::Constant(calibration.translation_floor_sigma_m),
       Eigen::Vector3d::Constant(calibration.rotation_floor_sigma_rad);
-  Matrix6d calibrated = calibration.covariance_scale * covariance + spread;
+  Matrix6d calibrated = calibration.covariance_scale * (covariance + spread);
   calibrated.diagonal() += floor.cwiseAbs2();
   return calibrated;
 }

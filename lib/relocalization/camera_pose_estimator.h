@@ -16,7 +16,7 @@ namespace relocd {
 /// it. The errors of neighbouring cells are not independent, so that the covariance that the
 /// equations give is too small by a factor that only held-out images tell.
 struct PoseCalibration {
-  double covariance_scale = 1.0;           ///< > 0; multiplies the covariance of the equations.
+  double covariance_scale = 1.0;  ///< > 0; of the equations' covariance and the hypotheses' spread.
   double translation_floor_sigma_m = 0.0;  ///< >= 0; added, in squares, to each axis.
   double rotation_floor_sigma_rad = 0.0;   ///< >= 0
   double min_confidence = 0.15;            ///< in [0, 1]; with less support there is no pose.
