@@ -32,6 +32,7 @@ constexpr std::array<Verb, 13> kVerbs{{
     {"map", "train a map from a drive, localize images in it, say what is in it"},
     {"can", "the signals of a recorded CAN bus, as the DBC file has them"},
     {"odometry", "odometry from a CAN log, as odometryd makes it"},
+    {"calibrate", "wheels, track, yaw rate and steering from a drive with a reference"},
     {"smooth", "fuse odometry and fixes from files, as smootherd does"},
     {"replay", "a recorded log through the daemons' code, exactly"},
     {"log", "inspect, cut, repair and export recorded logs"},

@@ -184,7 +184,7 @@ Result<void> Run(const Options& options) {
   }
   auto dbc = DbcFile::Read(config->can.dbc_file);
   if (!dbc) return std::move(dbc).error();
-  auto odometry = WheelOdometry::Create(config->odometry, *dbc);
+  auto odometry = WheelOdometry::Create(config->odometry, *dbc, config->can.messages);
   if (!odometry) return std::move(odometry).error();
   auto tables = Process(options, config->can.interface, *odometry);
   if (!tables) return std::move(tables).error();

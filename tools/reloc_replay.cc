@@ -82,7 +82,7 @@ class Replay {
   Result<void> AddOdometry() {
     const auto dbc = DbcFile::Read(config_.can.dbc_file);
     if (!dbc) return dbc.error();
-    auto odometry = WheelOdometry::Create(config_.odometry, *dbc);
+    auto odometry = WheelOdometry::Create(config_.odometry, *dbc, config_.can.messages);
     if (!odometry) return std::move(odometry).error();
     odometry_ = std::make_unique<OdometryNode>(
         config_.can, std::move(odometry).value(), bus_, kReplayRunId);

@@ -25,7 +25,7 @@ Result<WheelOdometry> MakeOdometry(const Config& config) {
   }
   auto dbc = DbcFile::Read(config.can.dbc_file);
   if (!dbc) return Error{ErrorKind::kInvalidInput, dbc.error().message};
-  return WheelOdometry::Create(config.odometry, *dbc);
+  return WheelOdometry::Create(config.odometry, *dbc, config.can.messages);
 }
 
 /// A source of CAN frames, opened again whenever it is lost, and the node.
@@ -46,7 +46,7 @@ class OdometryDaemon final : public Daemon {
   OdometryDaemon(DaemonContext& context, WheelOdometry odometry)
       : loop_(context.loop),
         source_(MakeCanSource(
-            context.config.can, odometry.signals().ids(), PlaybackEpoch(MonotonicClock::now()))),
+            context.config.can, odometry.ids(), PlaybackEpoch(MonotonicClock::now()))),
         node_(context.config.can, std::move(odometry), context.control_bus, context.run_id) {}
 
   Result<void> Start() {

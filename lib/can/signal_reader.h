@@ -32,6 +32,8 @@ class SignalReader {
   [[nodiscard]] std::optional<double> ValueAt(MonotonicTime now) const {
     return value_ && now - value_time_ <= guard_.max_age() ? value_ : std::nullopt;
   }
+  /// For how long a value is valid.
+  [[nodiscard]] Duration max_age() const { return guard_.max_age(); }
   [[nodiscard]] CanId id() const { return message_.id; }
   [[nodiscard]] const DbcSignal& signal() const { return signal_; }
   [[nodiscard]] const MessageGuard::Counters& counters() const { return guard_.counters(); }

@@ -35,6 +35,7 @@ Result<void> DifferentialDriveConfig::Validate() const {
   for (const Field& field : {Field{"left_radius_m", left_radius_m},
                              Field{"right_radius_m", right_radius_m},
                              Field{"track_m", track_m},
+                             Field{"wheelbase_m", wheelbase_m},
                              Field{"wheel_sigma_m_per_sqrt_m", wheel_sigma_m_per_sqrt_m},
                              Field{"lateral_sigma_m_per_sqrt_m", lateral_sigma_m_per_sqrt_m},
                              Field{"idle_sigma_m_per_sqrt_s", idle_sigma_m_per_sqrt_s},
@@ -43,7 +44,10 @@ Result<void> DifferentialDriveConfig::Validate() const {
       return Invalid(field.name, field.value, "positive and finite");
     }
   }
-  for (const Field& field : {Field{"left_scale", left_scale}, Field{"right_scale", right_scale}}) {
+  for (const Field& field : {Field{"left_scale", left_scale},
+                             Field{"right_scale", right_scale},
+                             Field{"front_left_scale", front_left_scale},
+                             Field{"front_right_scale", front_right_scale}}) {
     if (field.value == 0.0 || !std::isfinite(field.value)) {
       return Invalid(field.name, field.value, "finite and not 0");
     }
@@ -83,23 +87,28 @@ Eigen::Matrix3d RightJacobian(const Eigen::Vector3d& tangent) {
   return jacobian;
 }
 
+BodyMotion MotionFromTwist(const DifferentialDriveConfig& config,
+                           const Eigen::Vector3d& tangent,
+                           const Eigen::Matrix3d& covariance,
+                           double duration_s) {
+  Eigen::Matrix3d sum = covariance;
+  const double idle_m2 = Square(config.idle_sigma_m_per_sqrt_s) * duration_s;
+  sum(0, 0) += idle_m2;
+  sum(1, 1) += idle_m2 + Square(config.lateral_sigma_m_per_sqrt_m) * std::abs(tangent.x());
+  sum(2, 2) += Square(config.idle_sigma_rad_per_sqrt_s) * duration_s +
+               Square(config.turn_sigma_rad_per_sqrt_rad) * std::abs(tangent.z());
+  const Eigen::Matrix3d jacobian = RightJacobian(tangent);
+  return {.X_BiBj = Pose2::Exp(tangent), .covariance = jacobian * sum * jacobian.transpose()};
+}
+
 BodyMotion MotionFromTravel(const DifferentialDriveConfig& config, const WheelTravel& travel) {
   const Eigen::Matrix<double, 3, 2> body_from_wheels = BodyFromWheels(config.track_m);
   const Eigen::Vector3d tangent = body_from_wheels * travel.travel_m;
-
   const Eigen::Vector2d wheel_variance =
       Square(config.wheel_sigma_m_per_sqrt_m) * travel.travel_m.cwiseAbs() + travel.variance_m2;
-  Eigen::Matrix3d covariance =
+  const Eigen::Matrix3d covariance =
       body_from_wheels * wheel_variance.asDiagonal() * body_from_wheels.transpose();
-  const double idle_m2 = Square(config.idle_sigma_m_per_sqrt_s) * travel.duration_s;
-  covariance(0, 0) += idle_m2;
-  covariance(1, 1) += idle_m2 + Square(config.lateral_sigma_m_per_sqrt_m) * std::abs(tangent.x());
-  covariance(2, 2) += Square(config.idle_sigma_rad_per_sqrt_s) * travel.duration_s +
-                      Square(config.turn_sigma_rad_per_sqrt_rad) * std::abs(tangent.z());
-
-  const Eigen::Matrix3d jacobian = RightJacobian(tangent);
-  return {.X_BiBj = Pose2::Exp(tangent),
-          .covariance = jacobian * covariance * jacobian.transpose()};
+  return MotionFromTwist(config, tangent, covariance, travel.duration_s);
 }
 
 }  // namespace relocd

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 #include "core/result.h"
@@ -14,7 +16,10 @@ struct DifferentialDriveConfig {
   double right_radius_m = 0.1;
   double left_scale = 1.0;
   double right_scale = 1.0;
+  double front_left_scale = 1.0;
+  double front_right_scale = 1.0;
   double track_m = 0.5;
+  double wheelbase_m = 2.7;
   int ticks_per_revolution = 4096;
   double wheel_sigma_m_per_sqrt_m = 0.01;
   double lateral_sigma_m_per_sqrt_m = 0.005;
@@ -32,7 +37,10 @@ struct DifferentialDriveConfig {
     visit("right_scale",
           self.right_scale,
           "not 0; corrects the wheel's travel, negative if it counts backwards");
+    visit("front_left_scale", self.front_left_scale, "not 0; the same of a car's front wheel");
+    visit("front_right_scale", self.front_right_scale, "not 0; the same of a car's front wheel");
     visit("track_m", self.track_m, "> 0; between the wheels' contact points");
+    visit("wheelbase_m", self.wheelbase_m, "> 0; a car's, from the rear to the front axle");
     visit("ticks_per_revolution", self.ticks_per_revolution, ">= 1; of the wheel, for ticks");
     visit("wheel_sigma_m_per_sqrt_m",
           self.wheel_sigma_m_per_sqrt_m,
@@ -61,6 +69,7 @@ struct WheelTravel {
   /// Of each wheel's travel, in m^2, besides the config's: quantisation, or a guess over a gap.
   Eigen::Vector2d variance_m2 = Eigen::Vector2d::Zero();
   double duration_s = 0.0;
+  std::optional<Eigen::Vector2d> front_m{};  ///< Of a car's front wheels, if they are measured.
 };
 
 /// A motion of the body from Bi to Bj, and the covariance of its right perturbation.
@@ -75,6 +84,13 @@ struct BodyMotion {
 /// The covariance is that of two independent wheels and of what the config adds for sideways
 /// travel, turning and time, to first order.
 BodyMotion MotionFromTravel(const DifferentialDriveConfig& config, const WheelTravel& travel);
+
+/// The motion of a tangent (x, y, yaw) with this covariance, to which is added what the config has
+/// for sideways travel, turning and time, to first order.
+BodyMotion MotionFromTwist(const DifferentialDriveConfig& config,
+                           const Eigen::Vector3d& tangent,
+                           const Eigen::Matrix3d& covariance,
+                           double duration_s);
 
 /// The twist (x, y, yaw) of the body from what the left and the right wheel travel, or from their
 /// speeds.

@@ -14,6 +14,10 @@ namespace {
 
 /// Front and rear axle of a car that creeps round a corner differ by more than a part of it.
 constexpr double kAxleDifference = 0.5;  // m/s
+/// For how long a disagreement of wheels and yaw rate adds up, and how much of it is the fault of
+/// measurements that are not of the same time.
+constexpr double kAgreementS = 0.5;
+constexpr double kAgreementRad = 0.01;
 
 double Square(double value) {
   return value * value;
@@ -30,6 +34,21 @@ Error InSection(const char* section, const Error& error) {
 }  // namespace
 
 Result<void> OdometryConfig::Validate() const {
+  if (model != "differential" && model != "ackermann" && model != "four_wheel") {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format("model is '{}', must be one of differential, ackermann, four_wheel", model)};
+  }
+  if (model == "ackermann" && steering.signal.empty()) {
+    return Error{ErrorKind::kInvalidInput,
+                 "steering.signal is '', must be MESSAGE.SIGNAL with model ackermann"};
+  }
+  if (model == "four_wheel" && wheels.front_left_signal.empty()) {
+    return Error{ErrorKind::kInvalidInput,
+                 "wheels.front_left_signal is '', must be MESSAGE.SIGNAL with model four_wheel"};
+  }
+  if (auto ok = steering.Validate(); !ok) return InSection("steering", ok.error());
+  if (auto ok = yaw_rate.Validate(); !ok) return InSection("yaw_rate", ok.error());
   if (auto ok = wheels.Validate(); !ok) return InSection("wheels", ok.error());
   if (auto ok = drive.Validate(); !ok) return InSection("drive", ok.error());
   struct Field {
@@ -43,6 +62,7 @@ Result<void> OdometryConfig::Validate() const {
                              Field{"max_yaw_rate_radps", max_yaw_rate_radps},
                              Field{"max_acceleration_mps2", max_acceleration_mps2},
                              Field{"max_axle_difference", max_axle_difference},
+                             Field{"max_deviation_sigma", max_deviation_sigma},
                              Field{"slip_sigma", slip_sigma},
                              Field{"unknown_acceleration_mps2", unknown_acceleration_mps2}}) {
     if (!(field.value > 0.0) || !std::isfinite(field.value)) {
@@ -63,11 +83,14 @@ Result<void> OdometryConfig::Validate() const {
   return {};
 }
 
-Result<WheelOdometry> WheelOdometry::Create(const OdometryConfig& config, const DbcFile& dbc) {
+Result<WheelOdometry> WheelOdometry::Create(const OdometryConfig& config,
+                                            const DbcFile& dbc,
+                                            const WheelSignals::Rules& rules) {
   if (auto ok = config.Validate(); !ok) return std::move(ok).error();
-  auto signals = WheelSignals::Create(config.wheels, dbc);
+  auto signals = WheelSignals::Create(config.wheels, dbc, rules);
   if (!signals) return std::move(signals).error();
   WheelOdometry odometry(config, std::move(signals).value());
+  if (auto ok = odometry.AddSensors(dbc, rules); !ok) return std::move(ok).error();
   if (odometry.IsAmbiguous(config.max_interval_s)) {
     return Invalid("max_speed_mps",
                    config.max_speed_mps,
@@ -76,7 +99,64 @@ Result<WheelOdometry> WheelOdometry::Create(const OdometryConfig& config, const 
   return odometry;
 }
 
+Result<void> WheelOdometry::AddSensors(const DbcFile& dbc, const WheelSignals::Rules& rules) {
+  const auto add = [&](const std::string& name, std::optional<SignalReader>& to) -> Result<void> {
+    if (name.empty()) return {};
+    auto reader = SignalReader::Create(name, dbc, rules);
+    if (!reader) return std::move(reader).error();
+    to = std::move(reader).value();
+    return {};
+  };
+  if (auto ok = add(config_.steering.signal, steering_signal_); !ok) return ok;
+  if (auto ok = add(config_.steering.fraction_signal, steering_fraction_); !ok) return ok;
+  if (auto ok = add(config_.yaw_rate.signal, yaw_rate_signal_); !ok) return ok;
+  if (!yaw_rate_signal_) return {};
+  const double resolution_radps =
+      std::abs(yaw_rate_signal_->signal().factor * config_.yaw_rate.unit_radps);
+  yaw_rate_ = YawRateSensor(config_.yaw_rate, resolution_radps, yaw_rate_signal_->max_age());
+  return {};
+}
+
+std::vector<CanId> WheelOdometry::ids() const {
+  std::vector<CanId> ids = signals_.ids();
+  for (const auto* reader : {&steering_signal_, &steering_fraction_, &yaw_rate_signal_}) {
+    if (!reader->has_value()) continue;
+    const CanId id = (*reader)->id();
+    if (std::find(ids.begin(), ids.end(), id) == ids.end()) ids.push_back(id);
+  }
+  return ids;
+}
+
+std::optional<double> WheelOdometry::yaw_rate_bias_radps() const {
+  if (!yaw_rate_) return std::nullopt;
+  return yaw_rate_->bias_radps();
+}
+
+void WheelOdometry::HandleSensors(const CanFrame& frame) {
+  last_yaw_rate_.reset();
+  if (steering_signal_) steering_signal_->Handle(frame);
+  if (steering_fraction_) steering_fraction_->Handle(frame);
+  if (!yaw_rate_signal_) return;
+  if (const auto rate = yaw_rate_signal_->Handle(frame)) {
+    last_yaw_rate_ = {frame.receive_time, *rate * config_.yaw_rate.unit_radps};
+    yaw_rate_->Add(frame.receive_time, last_yaw_rate_->second);
+  }
+}
+
+std::optional<double> WheelOdometry::SteeringAt(MonotonicTime time) const {
+  if (!steering_signal_) return std::nullopt;
+  auto measured = steering_signal_->ValueAt(time);
+  if (!measured) return std::nullopt;
+  if (steering_fraction_) {
+    const auto fraction = steering_fraction_->ValueAt(time);
+    if (!fraction) return std::nullopt;
+    *measured += *fraction;
+  }
+  return config_.steering.WheelAngle(*measured);
+}
+
 std::optional<OdometryIncrement> WheelOdometry::Handle(const CanFrame& frame) {
+  HandleSensors(frame);
   last_sample_ = signals_.Handle(frame);
   if (!last_sample_) return std::nullopt;
   const WheelSample& sample = *last_sample_;
@@ -117,6 +197,7 @@ OdometryIncrement WheelOdometry::Begin(const WheelSample& sample) {
   }
   anchor_ = anchor;
   time_ = sample.time;
+  if (yaw_rate_) yaw_rate_->TurnTo(sample.time);
   // No time has passed; a covariance of zero would have no inverse.
   const BodyMotion none = MotionFromTravel(config_.drive, {.duration_s = config_.max_interval_s});
   return Publish(sample.time, none, std::exchange(pending_flags_, 0));
@@ -127,12 +208,19 @@ std::optional<OdometryIncrement> WheelOdometry::Accept(const WheelSample& sample
   suspect_.reset();
   std::int32_t flags = std::exchange(pending_flags_, 0);
   if (travel.duration_s > config_.max_interval_s) flags |= kOdometryGap;
-  if (IsSlipping(sample, travel)) flags |= kOdometrySlip;
-  if (UpdateStandstill(sample, travel)) flags |= kOdometryStandstill;
+  std::optional<TurnMeasurement> turn;
+  if (yaw_rate_) turn = yaw_rate_->TurnTo(sample.time);
+  const CarMeasurement measured = Measurement(sample, travel, turn);
+  const bool disagrees = Disagrees(measured);
+  if (IsSlipping(sample, travel) || disagrees) flags |= kOdometrySlip;
+  if (UpdateStandstill(sample, travel)) {
+    flags |= kOdometryStandstill;
+    if (yaw_rate_) yaw_rate_->LearnBias();
+  }
   if ((flags & kOdometryGap) != 0) ++counters_.gaps;
   if ((flags & kOdometrySlip) != 0) ++counters_.slips;
 
-  BodyMotion motion = Motion(travel, (flags & kOdometryGap) != 0, (flags & kOdometrySlip) != 0);
+  BodyMotion motion = Motion(measured, (flags & kOdometryGap) != 0, (flags & kOdometrySlip) != 0);
   MoveAnchor(sample, travel, motion.X_BiBj);
   if (!is_guess_) return Publish(sample.time, motion, flags);
 
@@ -170,7 +258,11 @@ OdometryIncrement WheelOdometry::Publish(MonotonicTime time,
                                          std::int32_t flags) {
   X_OB_ = is_guess_ ? X_OB_ * motion.X_BiBj : anchor_->X_OB;
   Eigen::Vector3d twist = BodyTwist(config_.drive.track_m, anchor_->speeds_mps);
-  if (is_guess_) twist = motion.X_BiBj.Log() / ToSeconds(time - time_);
+  if (is_guess_) {
+    twist = motion.X_BiBj.Log() / ToSeconds(time - time_);
+  } else if (!uses_only_rear() && time > time_) {
+    twist.z() = motion.X_BiBj.yaw() / std::max(ToSeconds(time - time_), ShortestInterval());
+  }
   OdometryIncrement increment{.previous_time = std::exchange(time_, time),
                               .time = time,
                               .X_BiBj = motion.X_BiBj,
@@ -232,7 +324,18 @@ WheelTravel WheelOdometry::TravelFromSpeeds(const WheelSample& from, const Wheel
   const Eigen::Vector2d rounding_m = duration_s * Eigen::Vector2d(resolution[0], resolution[1]);
   return {.travel_m = 0.5 * duration_s * (ScaledSpeeds(from) + ScaledSpeeds(to)),
           .variance_m2 = rounding_m.cwiseAbs2() / 12.0,
-          .duration_s = duration_s};
+          .duration_s = duration_s,
+          .front_m = FrontTravel(from, to)};
+}
+
+std::optional<Eigen::Vector2d> WheelOdometry::FrontTravel(const WheelSample& from,
+                                                          const WheelSample& to) const {
+  if (!signals_.has_front()) return std::nullopt;
+  const double half_s = 0.5 * ToSeconds(to.time - from.time);
+  const DifferentialDriveConfig& drive = config_.drive;
+  return Eigen::Vector2d(
+      drive.front_left_scale * half_s * (from.front_speeds_mps[0] + to.front_speeds_mps[0]),
+      drive.front_right_scale * half_s * (from.front_speeds_mps[1] + to.front_speeds_mps[1]));
 }
 
 WheelTravel WheelOdometry::Extrapolate(double duration_s) const {
@@ -273,8 +376,44 @@ bool WheelOdometry::IsSlipping(const WheelSample& sample, const WheelTravel& tra
   return std::abs(front - rear) > config_.max_axle_difference * faster + kAxleDifference;
 }
 
-BodyMotion WheelOdometry::Motion(WheelTravel travel, bool is_gap, bool is_slipping) const {
+CarMeasurement WheelOdometry::Measurement(const WheelSample& sample,
+                                          const WheelTravel& travel,
+                                          const std::optional<TurnMeasurement>& turn) const {
+  CarMeasurement measured{.rear = travel, .turn = turn};
+  if (config_.model == "differential") return measured;
+  if (config_.model == "four_wheel") measured.front_m = travel.front_m;
+  measured.steering_rad = SteeringAt(sample.time);
+  measured.steering_sigma_rad = config_.steering.sigma_rad;
+  // Without any other the wheels' difference is better than nothing.
+  const bool is_turn_known = measured.steering_rad || measured.turn;
+  measured.uses_rear_difference = config_.model == "four_wheel" || !is_turn_known;
+  return measured;
+}
+
+bool WheelOdometry::Disagrees(const CarMeasurement& measured) {
+  if (measured.turn) {
+    const DifferentialDriveConfig& drive = config_.drive;
+    const WheelTravel& rear = measured.rear;
+    const double wheels_rad = BodyTwist(drive.track_m, rear.travel_m).z();
+    const double wheels_variance =
+        (Square(drive.wheel_sigma_m_per_sqrt_m) * rear.travel_m.cwiseAbs() + rear.variance_m2)
+            .sum() /
+        Square(drive.track_m);
+    const double kept = std::exp(-rear.duration_s / kAgreementS);
+    disagreement_rad_ = kept * disagreement_rad_ + wheels_rad - measured.turn->turn_rad;
+    disagreement_variance_ =
+        Square(kept) * disagreement_variance_ + wheels_variance + measured.turn->variance_rad2;
+    const double allowed_rad =
+        config_.max_deviation_sigma * std::sqrt(disagreement_variance_) + kAgreementRad;
+    if (std::abs(disagreement_rad_) > allowed_rad) return true;
+  }
+  return measured.front_m &&
+         SolveCarTravel(config_.drive, measured).worst_residual > config_.max_deviation_sigma;
+}
+
+BodyMotion WheelOdometry::Motion(CarMeasurement measured, bool is_gap, bool is_slipping) const {
   const double acceleration = config_.unknown_acceleration_mps2;
+  WheelTravel& travel = measured.rear;
   const double squared_s2 = Square(travel.duration_s);
   if (is_slipping) {
     const double slip_m = config_.slip_sigma * travel.travel_m.cwiseAbs().maxCoeff();
@@ -284,7 +423,11 @@ BodyMotion WheelOdometry::Motion(WheelTravel travel, bool is_gap, bool is_slippi
     // How far off the trapezoid of two speeds can be if the wheel sped up and down again between.
     travel.variance_m2.array() += Square(0.25 * acceleration * squared_s2);
   }
-  BodyMotion motion = MotionFromTravel(config_.drive, travel);
+  BodyMotion motion =
+      uses_only_rear()
+          ? MotionFromTravel(config_.drive, travel)
+          : MotionFromBodyTravel(
+                config_.drive, SolveCarTravel(config_.drive, measured), travel.duration_s);
   if (is_gap) {
     // The heading may have gone another way than evenly: off by up to alpha T^2 / 8 in the middle,
     // which moves the end sideways by two thirds of that per metre.
@@ -318,8 +461,12 @@ Eigen::Vector2d WheelOdometry::ScaledSpeeds(const WheelSample& sample) const {
 Eigen::Vector2d WheelOdometry::SpeedsAt(const WheelSample& sample,
                                         const WheelTravel& travel) const {
   if (!signals_.are_ticks()) return ScaledSpeeds(sample);
+  return travel.travel_m / std::max(travel.duration_s, ShortestInterval());
+}
+
+double WheelOdometry::ShortestInterval() const {
   constexpr double kShortest = 0.2;  // of the longest interval that is regular
-  return travel.travel_m / std::max(travel.duration_s, kShortest * config_.max_interval_s);
+  return kShortest * config_.max_interval_s;
 }
 
 Eigen::Vector2d WheelOdometry::MetresPerTick() const {

@@ -3,23 +3,31 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "can/can_frame.h"
 #include "can/dbc.h"
+#include "can/signal_reader.h"
 #include "core/result.h"
 #include "core/time.h"
 #include "geometry/pose2.h"
+#include "odometry/car_travel.h"
 #include "odometry/differential_drive.h"
+#include "odometry/turn_sensors.h"
 #include "odometry/wheel_signals.h"
 
 namespace relocd {
 
 struct OdometryConfig {
-  WheelSignalsConfig wheels;
-  DifferentialDriveConfig drive;
+  std::string model = "differential";
+  WheelSignalsConfig wheels{};
+  DifferentialDriveConfig drive{};
+  SteeringConfig steering{};
+  YawRateConfig yaw_rate{};
   double max_interval_s = 0.05;
   double stale_after_s = 0.2;
   double stale_period_s = 0.1;
@@ -28,6 +36,7 @@ struct OdometryConfig {
   double max_yaw_rate_radps = 6.0;
   double max_acceleration_mps2 = 20.0;
   double max_axle_difference = 0.3;
+  double max_deviation_sigma = 6.0;
   double slip_sigma = 0.3;
   double unknown_acceleration_mps2 = 1.0;
   double standstill_speed_mps = 0.02;
@@ -35,8 +44,15 @@ struct OdometryConfig {
 
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
+    visit("model",
+          self.model,
+          "differential (left and right wheel), ackermann (their mean, and the steering) or "
+          "four_wheel (least squares of four wheels, and of the steering if there is one); a "
+          "yaw-rate sensor takes part in each");
     visit("wheels", self.wheels, "The signals of the wheels in the DBC file.");
     visit("drive", self.drive, "The geometry of the wheels, and how well they measure.");
+    visit("steering", self.steering, "A sensor of the steering's angle.");
+    visit("yaw_rate", self.yaw_rate, "A sensor of the yaw rate.");
     visit("max_interval_s",
           self.max_interval_s,
           "> 0; two measurements further apart are a gap, and their covariance is inflated");
@@ -58,6 +74,10 @@ struct OdometryConfig {
     visit("max_axle_difference",
           self.max_axle_difference,
           "> 0; front and rear axle whose speeds differ by more than this part are slipping");
+    visit("max_deviation_sigma",
+          self.max_deviation_sigma,
+          "> 0; wheels and yaw rate, or four wheels, that disagree by more of their standard "
+          "deviations are slipping");
     visit("slip_sigma", self.slip_sigma, "> 0; of the travel of a slipping wheel, as part of it");
     visit("unknown_acceleration_mps2",
           self.unknown_acceleration_mps2,
@@ -107,8 +127,11 @@ struct OdometryIncrement {
 /// Thread-bound; reads no clock.
 class WheelOdometry {
  public:
+  /// @param rules  how messages show that they are new and whole.
   /// @return kInvalidInput, as Validate and WheelSignals::Create.
-  static Result<WheelOdometry> Create(const OdometryConfig& config, const DbcFile& dbc);
+  static Result<WheelOdometry> Create(const OdometryConfig& config,
+                                      const DbcFile& dbc,
+                                      const WheelSignals::Rules& rules = {});
 
   /// The increment that this frame completes. The first measurement gives one without motion.
   std::optional<OdometryIncrement> Handle(const CanFrame& frame);
@@ -119,6 +142,16 @@ class WheelOdometry {
   /// The measurements that the last frame given to Handle completed, accepted or not.
   [[nodiscard]] const std::optional<WheelSample>& last_sample() const { return last_sample_; }
   [[nodiscard]] const WheelSignals& signals() const { return signals_; }
+  /// The frames that it needs, each once.
+  [[nodiscard]] std::vector<CanId> ids() const;
+  /// What the yaw-rate sensor is taken to report when nothing turns.
+  [[nodiscard]] std::optional<double> yaw_rate_bias_radps() const;
+  /// Of a front wheel in the middle, if it is measured and not too old.
+  [[nodiscard]] std::optional<double> SteeringAt(MonotonicTime time) const;
+  /// The last yaw rate, in rad/s without correction, and its time.
+  [[nodiscard]] const std::optional<std::pair<MonotonicTime, double>>& last_yaw_rate() const {
+    return last_yaw_rate_;
+  }
 
   struct Counters {
     std::int64_t samples = 0;       ///< Sets of measurements, accepted or not.
@@ -143,6 +176,12 @@ class WheelOdometry {
   WheelOdometry(const OdometryConfig& config, WheelSignals signals)
       : config_(config), signals_(std::move(signals)) {}
 
+  Result<void> AddSensors(const DbcFile& dbc, const WheelSignals::Rules& rules);
+  void HandleSensors(const CanFrame& frame);
+  [[nodiscard]] bool uses_only_rear() const {
+    return config_.model == "differential" && !yaw_rate_;
+  }
+
   OdometryIncrement Begin(const WheelSample& sample);
   std::optional<OdometryIncrement> Accept(const WheelSample& sample, const WheelTravel& travel);
   void MoveAnchor(const WheelSample& sample, const WheelTravel& travel, const Pose2& X_BiBj);
@@ -154,13 +193,20 @@ class WheelOdometry {
                                                           const WheelSample& to) const;
   [[nodiscard]] WheelTravel TravelFromTicks(const WheelSample& from, const WheelSample& to) const;
   [[nodiscard]] WheelTravel TravelFromSpeeds(const WheelSample& from, const WheelSample& to) const;
+  [[nodiscard]] std::optional<Eigen::Vector2d> FrontTravel(const WheelSample& from,
+                                                           const WheelSample& to) const;
   /// A guess of the travel within `duration_s` after the anchor.
   [[nodiscard]] WheelTravel Extrapolate(double duration_s) const;
   /// Whether a counter may have gone round more than half its range.
   [[nodiscard]] bool IsAmbiguous(double duration_s) const;
   [[nodiscard]] bool IsSlipping(const WheelSample& sample, const WheelTravel& travel) const;
   /// The motion, with a covariance that covers what was not seen of it, or slipped.
-  [[nodiscard]] BodyMotion Motion(WheelTravel travel, bool is_gap, bool is_slipping) const;
+  [[nodiscard]] BodyMotion Motion(CarMeasurement measured, bool is_gap, bool is_slipping) const;
+  [[nodiscard]] CarMeasurement Measurement(const WheelSample& sample,
+                                           const WheelTravel& travel,
+                                           const std::optional<TurnMeasurement>& turn) const;
+  /// Whether the wheels contradict the yaw rate, or each other.
+  bool Disagrees(const CarMeasurement& measured);
   bool UpdateStandstill(const WheelSample& sample, const WheelTravel& travel);
 
   [[nodiscard]] Eigen::Vector2d ScaledSpeeds(const WheelSample& sample) const;
@@ -170,9 +216,19 @@ class WheelOdometry {
   /// The shortest interval over which a rate is judged. Frames that wait together are stamped
   /// closer to each other than they were measured.
   [[nodiscard]] double JudgedInterval(double duration_s) const;
+  /// Less than this between two frames is taken to be the reception's doing.
+  [[nodiscard]] double ShortestInterval() const;
 
   OdometryConfig config_;
   WheelSignals signals_;
+  std::optional<SignalReader> steering_signal_;
+  std::optional<SignalReader> steering_fraction_;
+  std::optional<SignalReader> yaw_rate_signal_;
+  std::optional<YawRateSensor> yaw_rate_;
+  std::optional<std::pair<MonotonicTime, double>> last_yaw_rate_;
+  /// Turn by the wheels less that by the yaw rate, over the last half second, and its variance.
+  double disagreement_rad_ = 0.0;
+  double disagreement_variance_ = 0.0;
   std::optional<WheelSample> last_sample_;
   std::optional<Anchor> anchor_;
   std::optional<WheelSample> suspect_;  ///< The last set that was refused as a jump.

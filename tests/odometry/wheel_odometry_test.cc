@@ -5,6 +5,7 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -361,6 +362,163 @@ TEST_F(WheelSpeedOdometryTest, FlagsStandstillOfCreepingReadings) {
   const auto still = Send(0.3, 0.01, 0.0);
   ASSERT_TRUE(still);
   EXPECT_EQ(still->flags, kOdometryStandstill);
+}
+
+/// A car whose wheels, steering and yaw rate are in messages of their own; the yaw rate has a bias.
+constexpr const char* kCarDbc =
+    "BO_ 1 SPEEDS: 8 X\n"
+    " SG_ RL : 0|16@1- (0.001,0) [0|0] \"m/s\" X\n"
+    " SG_ RR : 16|16@1- (0.001,0) [0|0] \"m/s\" X\n"
+    " SG_ FL : 32|16@1- (0.001,0) [0|0] \"m/s\" X\n"
+    " SG_ FR : 48|16@1- (0.001,0) [0|0] \"m/s\" X\n"
+    "BO_ 2 STEERING: 2 X\n SG_ ANGLE : 0|16@1- (0.001,0) [0|0] \"rad\" X\n"
+    "BO_ 3 INERTIAL: 2 X\n SG_ YAW_RATE : 0|16@1- (0.0001,0) [0|0] \"rad/s\" X\n";
+
+OdometryConfig CarConfig(const std::string& model) {
+  OdometryConfig config{.model = model};
+  config.wheels.kind = "speed";
+  config.wheels.left_signal = "SPEEDS.RL";
+  config.wheels.right_signal = "SPEEDS.RR";
+  config.wheels.front_left_signal = "SPEEDS.FL";
+  config.wheels.front_right_signal = "SPEEDS.FR";
+  config.drive.track_m = 1.6;
+  config.drive.wheel_sigma_m_per_sqrt_m = 0.004;
+  config.steering = {.signal = "STEERING.ANGLE", .unit_rad = 1.0, .ratio = 15.0};
+  config.max_speed_mps = 30.0;
+  config.max_acceleration_mps2 = 1e4;  // the tests' drives change their speed at once
+  return config;
+}
+
+/// Drives arcs, and gives what odometry makes of the frames.
+class CarTest {
+ public:
+  explicit CarTest(const OdometryConfig& config)
+      : config_(config),
+        dbc_(DbcFile::Parse(kCarDbc, "v.dbc").value()),
+        odometry_(WheelOdometry::Create(config, dbc_).value()) {}
+
+  /// For `duration_s`; the right rear wheel turns faster by `spin_mps`.
+  void Drive(double speed_mps, double yaw_rate_radps, double duration_s, double spin_mps = 0.0) {
+    const double half_m = 0.5 * config_.drive.track_m;
+    const double across = config_.drive.wheelbase_m * yaw_rate_radps;
+    const double steering = speed_mps == 0.0 ? 0.0 : std::atan(across / speed_mps);
+    for (int i = 0; i < static_cast<int>(std::lround(duration_s * 100.0)); ++i) {
+      time_ns_ += kPeriodNs;
+      X_WB_ = X_WB_ * Pose2::Exp({0.01 * speed_mps, 0.0, 0.01 * yaw_rate_radps});
+      Send("STEERING", {15.0 * steering});
+      Send("INERTIAL", {yaw_rate_radps + kBias});
+      Send("SPEEDS",
+           {speed_mps - half_m * yaw_rate_radps,
+            speed_mps + half_m * yaw_rate_radps + spin_mps,
+            std::hypot(speed_mps - half_m * yaw_rate_radps, across),
+            std::hypot(speed_mps + half_m * yaw_rate_radps, across)});
+    }
+  }
+
+  /// Distance and heading from the truth.
+  [[nodiscard]] Eigen::Vector2d Error() const {
+    const Pose2 error = X_WB_.Inverse() * last_.X_OB;
+    return {error.translation().norm(), std::abs(error.yaw())};
+  }
+  [[nodiscard]] const WheelOdometry& odometry() const { return odometry_; }
+  [[nodiscard]] const OdometryIncrement& last() const { return last_; }
+
+  static constexpr double kBias = 0.03;
+
+ private:
+  void Send(const std::string& name, const std::vector<double>& values) {
+    const DbcMessage& message = *dbc_.FindMessage(name).value();
+    CanFrame frame;
+    frame.id = message.id;
+    frame.size = static_cast<std::uint8_t>(message.size);
+    frame.receive_time = FromNanoseconds(time_ns_);
+    for (std::size_t i = 0; i < values.size(); ++i)
+      EXPECT_TRUE(EncodeSignal(message.signals[i], values[i], frame.payload()));
+    if (const auto increment = odometry_.Handle(frame)) last_ = *increment;
+  }
+
+  OdometryConfig config_;
+  DbcFile dbc_;
+  WheelOdometry odometry_;
+  OdometryIncrement last_{};
+  std::int64_t time_ns_ = 0;
+  Pose2 X_WB_;
+};
+
+class CarModelTest : public testing::TestWithParam<const char*> {};
+
+TEST_P(CarModelTest, FollowsAKnownDrive) {
+  CarTest car(CarConfig(GetParam()));
+  car.Drive(0.0, 0.0, 1.0);
+  car.Drive(5.0, 0.0, 2.0);
+  car.Drive(5.0, 0.5, 3.0);
+  car.Drive(8.0, -0.4, 3.0);
+  EXPECT_LT(car.Error()[0], 0.15);  // half a period of each change of speed is not seen
+  EXPECT_LT(car.Error()[1], 0.01);
+  EXPECT_TRUE(IsCovariance(car.last().covariance));
+  EXPECT_NEAR(car.last().yaw_rate_radps, -0.4, 0.01);
+  EXPECT_EQ(car.odometry().counters().slips, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models,
+                         CarModelTest,
+                         testing::Values("differential", "ackermann", "four_wheel"));
+
+OdometryConfig WithYawRate(OdometryConfig config) {
+  config.yaw_rate = {.signal = "INERTIAL.YAW_RATE", .unit_radps = 1.0, .bias_sigma_radps = 0.05};
+  return config;
+}
+
+TEST(CarYawRateTest, LearnsTheBiasWhileItStandsAndFollows) {
+  CarTest car(WithYawRate(CarConfig("differential")));
+  car.Drive(0.0, 0.0, 3.0);
+  EXPECT_NEAR(car.odometry().yaw_rate_bias_radps().value(), CarTest::kBias, 2e-4);
+  EXPECT_EQ(car.last().flags, kOdometryStandstill);
+  car.Drive(5.0, 0.3, 5.0);
+  EXPECT_LT(car.Error()[1], 0.01);
+}
+
+TEST(CarYawRateTest, FlagsAWheelThatSpinsAndKeepsTheHeading) {
+  OdometryConfig config = CarConfig("differential");
+  config.wheels.front_left_signal = config.wheels.front_right_signal = "";
+  const auto heading_error = [](const OdometryConfig& of) {
+    CarTest car(of);
+    car.Drive(0.0, 0.0, 3.0);
+    car.Drive(2.0, 0.0, 2.0);
+    EXPECT_EQ(car.odometry().counters().slips, 0);
+    car.Drive(2.0, 0.0, 1.0, 0.19);
+    return Eigen::Vector2d(car.Error()[1], static_cast<double>(car.odometry().counters().slips));
+  };
+  const Eigen::Vector2d alone = heading_error(config);
+  const Eigen::Vector2d fused = heading_error(WithYawRate(config));
+  EXPECT_NEAR(alone[0], 0.119, 0.005);
+  EXPECT_EQ(alone[1], 0.0);
+  EXPECT_LT(fused[0], 0.04);
+  EXPECT_GT(fused[1], 30.0);
+}
+
+TEST(CarFourWheelTest, KeepsTheHeadingWhenOneWheelSpins) {
+  CarTest car(CarConfig("four_wheel"));
+  car.Drive(2.0, 0.0, 2.0);
+  car.Drive(2.0, 0.0, 1.0, 0.5);
+  EXPECT_LT(car.Error()[1], 0.05);  // 0.31 rad by the rear wheels
+  EXPECT_LT(car.Error()[0], 0.15);  // 0.25 m by the rear wheels' mean
+  EXPECT_GT(car.odometry().counters().slips, 50);
+}
+
+TEST(CarConfigTest, NamesWhatAModelNeeds) {
+  const auto error_of = [](OdometryConfig config) {
+    const auto valid = config.Validate();
+    return valid ? std::string() : valid.error().message;
+  };
+  EXPECT_EQ(error_of({.model = "bicycle"}),
+            "model is 'bicycle', must be one of differential, ackermann, four_wheel");
+  EXPECT_EQ(error_of({.model = "ackermann"}),
+            "steering.signal is '', must be MESSAGE.SIGNAL with model ackermann");
+  EXPECT_EQ(error_of({.model = "four_wheel"}),
+            "wheels.front_left_signal is '', must be MESSAGE.SIGNAL with model four_wheel");
+  EXPECT_EQ(error_of({.yaw_rate = {.scale = 0.0}}),
+            "yaw_rate.scale is 0, must be positive and finite");
 }
 
 TEST(OdometryConfigTest, AcceptsItsDefaultsAndNamesWhatIsWrong) {

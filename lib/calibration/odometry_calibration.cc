@@ -1,0 +1,456 @@
+#include "calibration/odometry_calibration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "geometry/angle.h"
+
+namespace relocd {
+namespace {
+
+/// A parameter, and how well it is known beforehand.
+struct Prior {
+  const char* name;
+  double DriveParameters::*value;
+  double sigma;
+};
+
+// Tyres of one size differ by 1 %, and from their nominal radius by a few. A drawing tells the
+// track to some percent, but tyres do not touch the ground in one point.
+constexpr std::array<Prior, 7> kWheelPriors = {{
+    {"left_scale", &DriveParameters::left_scale, 0.05},
+    {"right_scale", &DriveParameters::right_scale, 0.05},
+    {"track", &DriveParameters::track_m, 0.15},
+    {"time_offset", &DriveParameters::time_offset_s, 0.2},
+    {"mount_x", &DriveParameters::mount_x_m, 3.0},
+    {"mount_y", &DriveParameters::mount_y_m, 1.0},
+    {"mount_yaw", &DriveParameters::mount_yaw_rad, 0.2},
+}};
+constexpr std::array<Prior, 2> kYawRatePriors = {{
+    {"yaw_rate_scale", &DriveParameters::yaw_rate_scale, 0.1},
+    {"yaw_rate_bias", &DriveParameters::yaw_rate_bias_radps, 0.1},
+}};
+constexpr std::array<Prior, 2> kSteeringPriors = {{
+    {"steering_ratio", &DriveParameters::steering_ratio, 5.0},
+    {"steering_offset", &DriveParameters::steering_offset_rad, 0.5},
+}};
+/// A parameter whose deviation the drive left above this part of what it was is not known.
+constexpr double kKnownPart = 0.5;
+/// Below this turning along the way says nothing of its noise.
+constexpr double kLeastTurnRad = 6.0;
+
+/// One level of noise that is looked for, within limits that keep everything regular.
+struct NoiseLevel {
+  double DriveNoise::*value;
+  double low;
+  double high;
+};
+
+constexpr NoiseLevel kWheelSigma{&DriveNoise::wheel_sigma_m_per_sqrt_m, 1e-4, 1.0};
+constexpr NoiseLevel kLateralSigma{&DriveNoise::lateral_sigma_m_per_sqrt_m, 1e-4, 1.0};
+constexpr NoiseLevel kTurnSigma{&DriveNoise::turn_sigma_rad_per_sqrt_rad, 1e-4, 1.0};
+constexpr NoiseLevel kYawRateNoise{&DriveNoise::yaw_rate_noise_rad_per_sqrt_s, 1e-6, 1.0};
+constexpr NoiseLevel kSteeringSigma{&DriveNoise::steering_sigma_rad, 1e-5, 1.0};
+constexpr NoiseLevel kReferenceSigma{&DriveNoise::reference_sigma_m, 1e-4, 100.0};
+constexpr NoiseLevel kReferenceHeadingSigma{&DriveNoise::reference_sigma_rad, 1e-5, 3.0};
+
+/// What is looked for in one go.
+struct Search {
+  std::vector<Prior> priors{};
+  std::vector<NoiseLevel> levels{};
+};
+
+/// Gauss and Newton over the parameters, and a pattern search over the noise, in turn.
+class Fitter {
+ public:
+  Fitter(const DriveFilter& filter, DriveParameters initial, DriveNoise noise)
+      : filter_(filter), initial_(initial), parameters_(initial), noise_(noise) {}
+
+  void Fit(const Search& search) {
+    constexpr int kRounds = 6;
+    constexpr double kGain = 0.05;  // far below what tells one set of parameters from another
+    double cost = std::numeric_limits<double>::infinity();
+    for (int round = 0; round < kRounds; ++round) {
+      FitParameters(search.priors);
+      FitNoise(search.levels);
+      const double next = filter_.Run(parameters_, noise_).cost;
+      if (next > cost - kGain) break;
+      cost = next;
+    }
+    FitParameters(search.priors);
+  }
+
+  [[nodiscard]] const DriveParameters& parameters() const { return parameters_; }
+  [[nodiscard]] const DriveNoise& noise() const { return noise_; }
+  /// Of the priors given last.
+  [[nodiscard]] const Eigen::VectorXd& sigmas() const { return sigmas_; }
+  [[nodiscard]] DriveFit fit() const { return filter_.Run(parameters_, noise_); }
+
+ private:
+  [[nodiscard]] double PriorCost(const std::vector<Prior>& priors,
+                                 const DriveParameters& parameters) const {
+    double cost = 0.0;
+    for (const Prior& prior : priors)
+      cost += std::pow((parameters.*prior.value - initial_.*prior.value) / prior.sigma, 2);
+    return cost;
+  }
+
+  void FitParameters(const std::vector<Prior>& priors) {
+    const auto size = static_cast<Eigen::Index>(priors.size());
+    sigmas_ = Eigen::VectorXd::Zero(size);
+    if (size == 0) return;
+    constexpr int kIterations = 12;
+    double damping = 0.0;
+    DriveFit fit = filter_.Run(parameters_, noise_);
+    double cost = fit.cost + PriorCost(priors, parameters_);
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      const Eigen::MatrixXd jacobian = Jacobian(priors, fit.residuals.size());
+      Eigen::MatrixXd information = jacobian.transpose() * jacobian;
+      Eigen::VectorXd gradient = jacobian.transpose() * fit.residuals;
+      for (Eigen::Index i = 0; i < size; ++i) {
+        const Prior& prior = priors[static_cast<std::size_t>(i)];
+        information(i, i) += 1.0 / (prior.sigma * prior.sigma);
+        gradient[i] +=
+            (parameters_.*prior.value - initial_.*prior.value) / (prior.sigma * prior.sigma);
+      }
+      const Eigen::MatrixXd covariance =
+          information.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+      sigmas_ = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+      information.diagonal() *= 1.0 + damping;
+      const Eigen::VectorXd step = -information.ldlt().solve(gradient);
+      DriveParameters next = parameters_;
+      for (Eigen::Index i = 0; i < size; ++i)
+        next.*priors[static_cast<std::size_t>(i)].value += step[i];
+      const DriveFit next_fit = filter_.Run(next, noise_);
+      const double next_cost = next_fit.cost + PriorCost(priors, next);
+      if (!(next_cost < cost)) {
+        if (damping > 1e3) return;
+        damping = std::max(10.0 * damping, 1e-2);
+        continue;
+      }
+      const double gained = cost - next_cost;
+      damping *= 0.1;
+      parameters_ = next;
+      fit = next_fit;
+      cost = next_cost;
+      if (gained < 1e-4) return;
+    }
+  }
+
+  [[nodiscard]] Eigen::MatrixXd Jacobian(const std::vector<Prior>& priors,
+                                         Eigen::Index rows) const {
+    Eigen::MatrixXd jacobian(rows, static_cast<Eigen::Index>(priors.size()));
+    constexpr double kStep = 1e-3;  // of what is expected: far above rounding, far below bends
+    for (std::size_t i = 0; i < priors.size(); ++i) {
+      const double step = kStep * priors[i].sigma;
+      DriveParameters plus = parameters_;
+      DriveParameters minus = parameters_;
+      plus.*priors[i].value += step;
+      minus.*priors[i].value -= step;
+      jacobian.col(static_cast<Eigen::Index>(i)) =
+          (filter_.Run(plus, noise_).residuals - filter_.Run(minus, noise_).residuals) /
+          (2.0 * step);
+    }
+    return jacobian;
+  }
+
+  void FitNoise(const std::vector<NoiseLevel>& levels) {
+    double cost = filter_.Run(parameters_, noise_).cost;
+    for (const double factor : {3.0, 1.6, 1.25, 1.1, 1.04}) {
+      constexpr int kSweeps = 8;
+      bool better = true;
+      for (int sweep = 0; better && sweep < kSweeps; ++sweep) {
+        better = false;
+        for (const NoiseLevel& level : levels)
+          better = TryLevel(level, factor, cost) || better;
+      }
+    }
+  }
+
+  bool TryLevel(const NoiseLevel& level, double factor, double& cost) {
+    const double now = noise_.*level.value;
+    for (const double candidate : {now * factor, now / factor}) {
+      if (candidate < level.low || candidate > level.high) continue;
+      DriveNoise next = noise_;
+      next.*level.value = candidate;
+      const double next_cost = filter_.Run(parameters_, next).cost;
+      if (!(next_cost < cost)) continue;
+      cost = next_cost;
+      noise_ = next;
+      return true;
+    }
+    return false;
+  }
+
+  const DriveFilter& filter_;
+  DriveParameters initial_;
+  DriveParameters parameters_;
+  DriveNoise noise_;
+  Eigen::VectorXd sigmas_;
+};
+
+std::vector<ReferencePose> Thin(const std::vector<ReferencePose>& references, double spacing_s) {
+  std::vector<ReferencePose> thinned;
+  for (const ReferencePose& reference : references) {
+    if (thinned.empty() || reference.time_s >= thinned.back().time_s + spacing_s)
+      thinned.push_back(reference);
+  }
+  return thinned;
+}
+
+/// Looks for parameters, gives up those that the drive does not tell, and looks for the others
+/// again.
+DriveFit Calibrate(const DriveFilter& filter,
+                   const Search& search,
+                   const std::set<std::string>& fixed,
+                   OdometryCalibration& calibration) {
+  Search open = search;
+  std::erase_if(open.priors, [&](const Prior& prior) { return fixed.contains(prior.name); });
+  const DriveParameters initial = calibration.drive;
+  std::vector<CalibratedParameter> unknown;
+  while (true) {
+    Fitter fitter(filter, initial, calibration.noise);
+    fitter.Fit(open);
+    // The worst of those that are not known; without it others may be.
+    std::size_t worst = open.priors.size();
+    double worst_part = kKnownPart;
+    for (std::size_t i = 0; i < open.priors.size(); ++i) {
+      const double part = fitter.sigmas()[static_cast<Eigen::Index>(i)] / open.priors[i].sigma;
+      if (part < worst_part) continue;
+      worst = i;
+      worst_part = part;
+    }
+    if (worst < open.priors.size()) {
+      const Prior& prior = open.priors[worst];
+      unknown.push_back({.name = prior.name,
+                         .before = initial.*prior.value,
+                         .expected_sigma = prior.sigma,
+                         .after = initial.*prior.value,
+                         .sigma = worst_part * prior.sigma});
+      open.priors.erase(open.priors.begin() + static_cast<std::ptrdiff_t>(worst));
+      continue;
+    }
+    for (std::size_t i = 0; i < open.priors.size(); ++i) {
+      const Prior& prior = open.priors[i];
+      calibration.parameters.push_back({.name = prior.name,
+                                        .before = initial.*prior.value,
+                                        .expected_sigma = prior.sigma,
+                                        .after = fitter.parameters().*prior.value,
+                                        .sigma = fitter.sigmas()[static_cast<Eigen::Index>(i)],
+                                        .is_known = true});
+    }
+    calibration.parameters.insert(calibration.parameters.end(), unknown.begin(), unknown.end());
+    calibration.drive = fitter.parameters();
+    calibration.noise = fitter.noise();
+    return fitter.fit();
+  }
+}
+
+/// How far the reference moves and turns.
+struct Extent {
+  double length_m = 0.0;
+  double turn_rad = 0.0;
+  bool has_heading = true;
+};
+
+Extent Measure(const std::vector<ReferencePose>& references) {
+  Extent extent;
+  for (std::size_t i = 0; i < references.size(); ++i) {
+    extent.has_heading = extent.has_heading && references[i].has_heading;
+    if (i == 0) continue;
+    const Pose2 X_ij = references[i - 1].X_WR.Inverse() * references[i].X_WR;
+    extent.length_m += X_ij.translation().norm();
+    extent.turn_rad += std::abs(X_ij.yaw());
+  }
+  return extent;
+}
+
+DriveParameters InitialParameters(const OdometryConfig& config, const DriveParameters& given) {
+  DriveParameters initial = given;
+  initial.left_scale = 1.0;
+  initial.right_scale = 1.0;
+  initial.track_m = config.drive.track_m;
+  initial.wheelbase_m = config.drive.wheelbase_m;
+  initial.steering_ratio = config.steering.ratio;
+  initial.steering_offset_rad = config.steering.offset_rad;
+  initial.yaw_rate_scale = config.yaw_rate.scale;
+  initial.yaw_rate_bias_radps = config.yaw_rate.bias_radps;
+  return initial;
+}
+
+void CalibrateSensors(const OdometryRecording& recording,
+                      const std::vector<ReferencePose>& references,
+                      const std::set<std::string>& fixed,
+                      OdometryCalibration& calibration) {
+  if (recording.has_yaw_rate) {
+    const DriveFilter filter(recording, references, TurnSource::kYawRate);
+    Calibrate(filter,
+              {.priors = {kYawRatePriors.begin(), kYawRatePriors.end()}, .levels = {kYawRateNoise}},
+              fixed,
+              calibration);
+  }
+  if (recording.has_steering) {
+    const DriveFilter filter(recording, references, TurnSource::kSteering);
+    Calibrate(
+        filter,
+        {.priors = {kSteeringPriors.begin(), kSteeringPriors.end()}, .levels = {kSteeringSigma}},
+        fixed,
+        calibration);
+  }
+}
+
+/// The front wheels' scales: how far each should have rolled by the calibrated rear axle, in the
+/// median over seconds.
+void CalibrateFront(const OdometryRecording& recording, OdometryCalibration& calibration) {
+  constexpr double kBlockS = 1.0;
+  constexpr double kLeastM = 0.5;
+  const DriveParameters& drive = calibration.drive;
+  const auto& samples = recording.samples;
+  for (std::size_t wheel = 2; wheel < OdometryRecording::kWheels; ++wheel) {
+    const double y_m = (wheel == 2 ? 0.5 : -0.5) * drive.track_m;
+    std::vector<double> ratios;
+    double expected_m = 0.0;
+    std::size_t begin = 0;
+    for (std::size_t i = 1; i < samples.size(); ++i) {
+      const double left_m =
+          drive.left_scale * (samples[i].travel_m[0] - samples[i - 1].travel_m[0]);
+      const double right_m =
+          drive.right_scale * (samples[i].travel_m[1] - samples[i - 1].travel_m[1]);
+      const double turn_rad = (right_m - left_m) / drive.track_m;
+      const double along_m = 0.5 * (left_m + right_m) - y_m * turn_rad;
+      expected_m += std::copysign(std::hypot(along_m, drive.wheelbase_m * turn_rad), along_m);
+      if (samples[i].time_s < samples[begin].time_s + kBlockS) continue;
+      const double measured_m = samples[i].travel_m.at(wheel) - samples[begin].travel_m.at(wheel);
+      if (std::abs(measured_m) > kLeastM) ratios.push_back(expected_m / measured_m);
+      expected_m = 0.0;
+      begin = i;
+    }
+    CalibratedParameter parameter{.name = wheel == 2 ? "front_left_scale" : "front_right_scale",
+                                  .before = 1.0,
+                                  .expected_sigma = 0.05,
+                                  .after = 1.0,
+                                  .sigma = 0.05};
+    constexpr std::size_t kLeastRatios = 5;
+    if (ratios.size() >= kLeastRatios) {
+      const auto median = [](std::vector<double> values) {
+        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+        std::nth_element(values.begin(), middle, values.end());
+        return *middle;
+      };
+      parameter.after = median(ratios);
+      for (double& ratio : ratios)
+        ratio = std::abs(ratio - parameter.after);
+      // Of a normal distribution: sigma from the median deviation, and of a median from sigma.
+      parameter.sigma =
+          1.4826 * median(ratios) * 1.2533 / std::sqrt(static_cast<double>(ratios.size()));
+      parameter.is_known = true;
+    }
+    calibration.parameters.push_back(parameter);
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> CalibrationParameterNames() {
+  std::vector<std::string> names;
+  for (const Prior& prior : kWheelPriors)
+    names.emplace_back(prior.name);
+  for (const Prior& prior : kYawRatePriors)
+    names.emplace_back(prior.name);
+  for (const Prior& prior : kSteeringPriors)
+    names.emplace_back(prior.name);
+  return names;
+}
+
+Result<OdometryCalibration> CalibrateOdometry(const OdometryRecording& recording,
+                                              const std::vector<ReferencePose>& references,
+                                              const OdometryConfig& config,
+                                              const OdometryCalibrationOptions& options) {
+  const DriveFilter filter(recording, Thin(references, options.spacing_s), TurnSource::kWheels);
+  const Extent extent = Measure(filter.references());
+  constexpr std::size_t kLeastReferences = 10;
+  constexpr double kLeastLengthM = 5.0;
+  if (filter.references().size() < kLeastReferences || extent.length_m < kLeastLengthM) {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format("the reference has {} poses over {:.1f} m while the vehicle was recorded, "
+                    "must have at least {}, {} s apart, over {} m",
+                    filter.references().size(),
+                    extent.length_m,
+                    kLeastReferences,
+                    options.spacing_s,
+                    kLeastLengthM)};
+  }
+  OdometryCalibration calibration;
+  calibration.drive = InitialParameters(config, options.initial);
+  calibration.noise.wheel_sigma_m_per_sqrt_m =
+      std::max(config.drive.wheel_sigma_m_per_sqrt_m, 0.02);
+  calibration.noise.turn_sigma_rad_per_sqrt_rad = config.drive.turn_sigma_rad_per_sqrt_rad;
+  Search search{.priors = {kWheelPriors.begin(), kWheelPriors.end()},
+                .levels = {kReferenceSigma, kWheelSigma, kLateralSigma}};
+  std::set<std::string> fixed = options.fixed;
+  if (extent.has_heading) {
+    search.levels.push_back(kReferenceHeadingSigma);
+  } else {
+    fixed.insert("mount_yaw");  // nothing tells it
+  }
+  calibration.has_turn_noise = extent.turn_rad > kLeastTurnRad;
+  if (calibration.has_turn_noise) search.levels.push_back(kTurnSigma);
+  const DriveFit fit = Calibrate(filter, search, fixed, calibration);
+  calibration.has_lateral_noise =
+      calibration.noise.lateral_sigma_m_per_sqrt_m > 3.0 * kLateralSigma.low;
+  calibration.has_turn_noise = calibration.has_turn_noise &&
+                               calibration.noise.turn_sigma_rad_per_sqrt_rad > 3.0 * kTurnSigma.low;
+  calibration.references = fit.references;
+  calibration.outliers = fit.outliers;
+  calibration.residual_rms =
+      std::sqrt(fit.residuals.squaredNorm() / static_cast<double>(fit.residuals.size()));
+  CalibrateSensors(recording, filter.references(), fixed, calibration);
+  if (recording.has_front) CalibrateFront(recording, calibration);
+  return calibration;
+}
+
+OdometryConfig ApplyCalibration(const OdometryConfig& config,
+                                const OdometryCalibration& calibration) {
+  OdometryConfig applied = config;
+  const DriveParameters& drive = calibration.drive;
+  if (config.wheels.kind == "ticks") {
+    applied.drive.left_radius_m *= drive.left_scale;
+    applied.drive.right_radius_m *= drive.right_scale;
+  } else {
+    applied.drive.left_scale *= drive.left_scale;
+    applied.drive.right_scale *= drive.right_scale;
+  }
+  applied.drive.track_m = drive.track_m;
+  applied.drive.wheel_sigma_m_per_sqrt_m = calibration.noise.wheel_sigma_m_per_sqrt_m;
+  if (calibration.has_lateral_noise)
+    applied.drive.lateral_sigma_m_per_sqrt_m = calibration.noise.lateral_sigma_m_per_sqrt_m;
+  if (calibration.has_turn_noise)
+    applied.drive.turn_sigma_rad_per_sqrt_rad = calibration.noise.turn_sigma_rad_per_sqrt_rad;
+  applied.steering.ratio = drive.steering_ratio;
+  applied.steering.offset_rad = drive.steering_offset_rad;
+  applied.yaw_rate.scale = drive.yaw_rate_scale;
+  applied.yaw_rate.bias_radps = drive.yaw_rate_bias_radps;
+  for (const CalibratedParameter& parameter : calibration.parameters) {
+    if (!parameter.is_known) continue;
+    if (parameter.name == "front_left_scale") applied.drive.front_left_scale *= parameter.after;
+    if (parameter.name == "front_right_scale") applied.drive.front_right_scale *= parameter.after;
+    if (parameter.name == "yaw_rate_bias") {
+      applied.yaw_rate.bias_sigma_radps = std::max(parameter.sigma, 1e-5);
+      applied.yaw_rate.noise_rad_per_sqrt_s = calibration.noise.yaw_rate_noise_rad_per_sqrt_s;
+    }
+    if (parameter.name == "steering_offset")
+      applied.steering.sigma_rad = calibration.noise.steering_sigma_rad;
+  }
+  return applied;
+}
+
+}  // namespace relocd
