@@ -506,6 +506,39 @@ TEST(CarFourWheelTest, KeepsTheHeadingWhenOneWheelSpins) {
   EXPECT_GT(car.odometry().counters().slips, 50);
 }
 
+/// Whatever the frames hold, and in whatever order they come, increments stay finite.
+TEST_P(CarModelTest, SurvivesHostileFrames) {
+  OdometryConfig config = WithYawRate(CarConfig(GetParam()));
+  config.max_acceleration_mps2 = 15.0;
+  const DbcFile dbc = DbcFile::Parse(kCarDbc, "v.dbc").value();
+  WheelOdometry odometry = WheelOdometry::Create(config, dbc).value();
+  std::mt19937 engine(11);
+  std::int64_t time_ns = 0;
+  int increments = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const DbcMessage& message = dbc.messages()[engine() % 3];
+    time_ns += static_cast<std::int64_t>(engine() % 20'000'000) - (i % 17 == 0 ? 15'000'000 : 0);
+    if (engine() % 500 == 0) time_ns += 3'000'000'000;
+    CanFrame frame;
+    frame.id = message.id;
+    frame.size = static_cast<std::uint8_t>(engine() % 20 == 0 ? engine() % 9 : message.size);
+    frame.receive_time = FromNanoseconds(time_ns);
+    for (std::uint8_t& byte : frame.data)  // mostly speeds that are accepted
+      byte = static_cast<std::uint8_t>(
+          &byte - frame.data.data() > 1 && engine() % 8 != 0 ? engine() % 16 : engine());
+    for (const auto& increment :
+         {odometry.Handle(frame), odometry.Tick(FromNanoseconds(time_ns))}) {
+      if (!increment || increment->time == increment->previous_time) continue;
+      ++increments;
+      ASSERT_GT(increment->time, increment->previous_time);
+      ASSERT_TRUE(IsCovariance(increment->covariance)) << increment->covariance;
+      ASSERT_TRUE(increment->X_OB.Log().allFinite());
+      ASSERT_TRUE(std::isfinite(increment->yaw_rate_radps));
+    }
+  }
+  EXPECT_GT(increments, 500);
+}
+
 TEST(CarConfigTest, NamesWhatAModelNeeds) {
   const auto error_of = [](OdometryConfig config) {
     const auto valid = config.Validate();
