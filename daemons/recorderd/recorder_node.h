@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -33,10 +34,14 @@ class RecorderNode {
   /// Writes what is in memory, and waits for the disk.
   Result<void> Stop() { return segments_.Close(); }
 
-  [[nodiscard]] NodeStatus Status(const ClockReading& now) const;
+  /// A disk that is full takes a little now and then: it is said until it has taken all for a
+  /// while.
+  [[nodiscard]] NodeStatus Status(const ClockReading& now);
 
  private:
   SegmentWriter segments_;
+  std::int64_t told_dropped_ = 0;              ///< When Status was last asked.
+  std::optional<MonotonicTime> dropped_time_;  ///< When events were last seen to be dropped.
 };
 
 }  // namespace relocd

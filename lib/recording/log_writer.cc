@@ -49,6 +49,10 @@ Result<void> LogWriter::Flush() {
   return {};
 }
 
+UniqueFd LogWriter::DuplicateFd() const {
+  return UniqueFd(::fcntl(fd_.get(), F_DUPFD_CLOEXEC, 0));
+}
+
 Result<void> LogWriter::Sync() {
   if (auto ok = Flush(); !ok) return ok;
   if (::fdatasync(fd_.get()) != 0) {

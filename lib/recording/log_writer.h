@@ -26,6 +26,9 @@ class LogWriter {
   /// Writes what is in memory. @return kUnavailable.
   Result<void> Flush();
 
+  /// Another descriptor of the file, for who waits for the disk; invalid when there are too many.
+  [[nodiscard]] UniqueFd DuplicateFd() const;
+
   /// Flush, and waits until the disk has it.
   Result<void> Sync();
 

@@ -62,6 +62,7 @@ Result<void> SegmentWriter::Open() {
     return Error{ErrorKind::kUnavailable,
                  fmt::format("creating the folder {}: {}", config_.directory, error.message())};
   }
+  if (!sync_) sync_.emplace();
   return {};
 }
 
@@ -109,6 +110,12 @@ void SegmentWriter::Flush() {
   }
   unsynced_events_ = 0;
   problem_.clear();
+  if (!sync_) return;
+  if (auto ok = sync_->last_result(); !ok) {
+    problem_ = std::move(ok).error().message;
+    last_problem_ = problem_;
+  }
+  if (UniqueFd file = segment_->DuplicateFd(); file.valid()) sync_->Request(std::move(file));
 }
 
 Result<void> SegmentWriter::Close() {
@@ -121,6 +128,7 @@ Result<void> SegmentWriter::Close() {
 void SegmentWriter::Drop(std::int64_t events, const Error& error) {
   counters_.dropped += events;
   problem_ = error.message;
+  last_problem_ = error.message;
   // What a full disk took of an event is damage that a reader skips. A new file begins once there
   // is room.
   segment_.reset();

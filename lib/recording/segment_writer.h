@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/result.h"
+#include "recording/background_sync.h"
 #include "recording/log_writer.h"
 #include "recording/recorder_config.h"
 
@@ -35,7 +36,8 @@ class SegmentWriter {
               std::string_view channel,
               std::span<const std::uint8_t> data);
 
-  /// To be called every flush_s: hands memory to the disk, and keeps the quota.
+  /// To be called every flush_s: hands memory to the kernel, has the disk take it soon, and keeps
+  /// the quota.
   void Flush();
 
   /// Flushes and waits for the disk. @return kUnavailable.
@@ -50,6 +52,8 @@ class SegmentWriter {
   [[nodiscard]] const Counters& counters() const { return counters_; }
   /// Why events are being dropped; empty while all is well.
   [[nodiscard]] const std::string& problem() const { return problem_; }
+  /// Why events were dropped the last time; empty if none ever were.
+  [[nodiscard]] const std::string& last_problem() const { return last_problem_; }
 
  private:
   Result<void> OpenSegment(std::int64_t timestamp_us);
@@ -65,6 +69,9 @@ class SegmentWriter {
   int segment_number_ = 0;
   Counters counters_;
   std::string problem_;
+  std::string last_problem_;
+  std::optional<BackgroundSync>
+      sync_;  ///< From Open() on. Has a thread: last, so that it ends first.
 };
 
 }  // namespace relocd
