@@ -17,7 +17,7 @@ namespace {
 constexpr int kWarning = 4;  // syslog's
 constexpr int kNotice = 5;
 constexpr Duration kTickPeriod = std::chrono::milliseconds(10);
-constexpr Duration kRetryPeriod = std::chrono::milliseconds(200);
+constexpr Duration kRetryPeriod = std::chrono::milliseconds(100);
 
 Result<WheelOdometry> MakeOdometry(const Config& config) {
   if (config.can.dbc_file.empty()) {
