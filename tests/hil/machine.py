@@ -1,7 +1,11 @@
 """What the cases share: the guest's devices, programs, and the passing of time."""
 
+import json
 import pathlib
+import socket
+import struct
 import subprocess
+import threading
 import time
 
 SOURCE = BUILD = pathlib.Path()  # set by run_case.py
@@ -120,3 +124,102 @@ def journal(unit="relocd"):
 def make_can(name="can0"):
     run("ip", "link", "add", "dev", name, "type", "vcan")
     run("ip", "link", "set", name, "up")
+
+
+CONFIG = pathlib.Path("/etc/relocd/robot.yaml")
+
+
+def deploy(settings="", inference=False, config=None):
+    """The packages' files and accounts without the package manager, which takes longer; the service runs.
+
+    `settings` are put before the config, which is the shipped one by default.
+    """
+    for log in pathlib.Path("/var/log/relocd").glob("*.lcmlog"):  # of this machine, which the guest sees
+        log.unlink()
+    for name in ("relocd", "relocd-tools"):
+        run("dpkg-deb", "-x", packages()[name], "/")
+    run("systemd-sysusers", "relocd.conf", stderr=subprocess.DEVNULL)
+    run("systemd-tmpfiles", "--create", "relocd.conf")
+    run("/lib/systemd/systemd-sysctl", "60-relocd.conf")
+    for device in pathlib.Path("/dev").glob("video*"):  # as udev would
+        run("chgrp", "video", device)
+        device.chmod(0o660)
+    supervisor = "" if inference else "supervisor: {inferenced: {enabled: false}}\n"
+    CONFIG.write_text(settings + supervisor + (config or CONFIG.read_text()))
+    run("systemctl", "daemon-reload")
+    run("systemctl", "start", "relocd")
+    ready = "5/5" if inference else "4/4"
+    wait_until(lambda: service("StatusText").startswith(f"{ready} ready"), "all daemons are ready", 30)
+
+
+def child(name):
+    """The pid of a daemon of the service; 0 without one."""
+    found = subprocess.run(["pgrep", "-x", "-P", service("MainPID"), name], stdout=subprocess.PIPE, text=True)
+    return int(found.stdout.split()[0]) if found.stdout else 0
+
+
+class Wheels(threading.Thread):
+    """Sends the drive's CAN frames on time, and goes on where the interface is gone for a while."""
+
+    def __init__(self, interface="can0"):
+        super().__init__(daemon=True)
+        self._interface = interface
+        self._frames = []
+        for line in (drive() / "can0.log").read_text().splitlines():
+            stamp, _, frame = line.split()
+            identifier, data = frame.split("#")
+            payload = bytes.fromhex(data)
+            self._frames.append((float(stamp[1:-1]), struct.pack("=IB3x8s", int(identifier, 16), len(payload), payload)))
+        self.sent_ns = []  # CLOCK_MONOTONIC of each frame that was taken
+
+    def run(self):
+        bus, begin = None, time.monotonic()
+        for due_s, frame in self._frames:
+            time.sleep(max(0.0, begin + due_s - time.monotonic()))
+            try:
+                if bus is None:
+                    bus = socket.socket(socket.PF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+                    bus.bind((self._interface,))
+                bus.send(frame)
+                self.sent_ns.append(time.monotonic_ns())
+            except OSError:
+                bus = None
+
+
+def raw_events(path):
+    """The events of a file in LCM's log format: (channel, wall clock of the arrival in us, bytes)."""
+    data, place = path.read_bytes(), 0
+    while place + 28 <= len(data):
+        sync, _, wall_us, channel_size, size = struct.unpack_from(">IqqII", data, place)
+        begin = place + 28 + channel_size
+        if sync != 0xEDA1DA01 or begin + size > len(data):
+            place += 1
+            continue
+        yield data[begin - channel_size:begin].decode(), wall_us, data[begin:begin + size]
+        place = begin + size
+
+
+def events():
+    """Every message that the recorder kept: (channel, CLOCK_MONOTONIC of the measurement in ns)."""
+    wall_minus_monotonic_ns = time.time_ns() - time.monotonic_ns()
+    for path in sorted(pathlib.Path("/var/log/relocd").glob("*.lcmlog")):
+        for channel, _, body in raw_events(path):
+            if channel.startswith("IMAGE_"):  # begins with the wall clock only
+                yield channel, struct.unpack_from(">q", body, 8)[0] * 1000 - wall_minus_monotonic_ns
+            elif len(body) >= 24:
+                yield channel, struct.unpack_from(">q", body, 16)[0]
+
+
+def times_of(channel):
+    return [mono_ns for name, mono_ns in events() if name == channel]
+
+
+def longest_gap_s(times_ns, begin_ns=0):
+    times_ns = [time_ns for time_ns in times_ns if time_ns >= begin_ns]
+    return max((b - a for a, b in zip(times_ns, times_ns[1:])), default=0) * 1e-9
+
+
+def statuses():
+    """What each daemon says of itself, by its name, with its values."""
+    said = subprocess.run(["reloc", "status", "--json"], stdout=subprocess.PIPE, text=True).stdout
+    return {daemon["daemon"]: daemon for daemon in json.loads(said)["daemons"]}
