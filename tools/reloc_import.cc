@@ -1,8 +1,11 @@
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -13,6 +16,7 @@
 #include "core/csv.h"
 #include "core/exit_code.h"
 #include "core/file.h"
+#include "core/parse_number.h"
 #include "geometry/planar.h"
 #include "geometry/trajectory.h"
 
@@ -141,6 +145,56 @@ Result<void> ImportNclt(const NcltOptions& options) {
   return {};
 }
 
+struct KittiOptions {
+  std::string poses;
+  std::string out;
+  double rate_hz = 10.0;
+};
+
+constexpr std::size_t kKittiNumbers = 12;
+
+/// The numbers of a line of KITTI's poses: a 3x4 matrix, camera to world, row by row.
+Result<std::vector<double>> KittiNumbers(std::string_view line, const std::string& where) {
+  std::vector<double> numbers;
+  for (line = Trim(line); !line.empty();) {
+    const std::size_t end = std::min(line.find(' '), line.size());
+    const auto number = ParseDouble(line.substr(0, end));
+    if (!number || !std::isfinite(*number)) {
+      return Error{ErrorKind::kInvalidInput,
+                   fmt::format("{}: '{}' is no finite number", where, line.substr(0, end))};
+    }
+    numbers.push_back(*number);
+    line = Trim(line.substr(end));
+  }
+  if (numbers.size() == kKittiNumbers) return numbers;
+  return Error{
+      ErrorKind::kInvalidInput,
+      fmt::format("{}: has {} numbers, must have {}", where, numbers.size(), kKittiNumbers)};
+}
+
+/// The path in the ground plane: the camera looks along z, x is to its right.
+Result<void> ImportKitti(const KittiOptions& options) {
+  if (!(options.rate_hz > 0.0 && std::isfinite(options.rate_hz))) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("--rate-hz is {}, must be > 0 and finite", options.rate_hz)};
+  }
+  const auto text = ReadFile(options.poses);
+  if (!text) return text.error();
+  std::string out = "t_s,x_m,y_m,theta_rad\n";
+  std::string_view rest = *text;
+  for (int row = 0; !rest.empty(); ++row) {
+    const std::size_t end = std::min(rest.find('\n'), rest.size());
+    const auto numbers =
+        KittiNumbers(rest.substr(0, end), fmt::format("{}: line {}", options.poses, row + 1));
+    if (!numbers) return numbers.error();
+    const std::vector<double>& n = *numbers;
+    out +=
+        fmt::format("{},{},{},{}\n", row / options.rate_hz, n[11], -n[3], std::atan2(-n[2], n[10]));
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+  }
+  return WriteFileAtomically(options.out, out);
+}
+
 }  // namespace
 }  // namespace relocd
 
@@ -160,13 +214,22 @@ int main(int argc, char** argv) {
   nclt_command->add_option("--odometry", nclt.odometry, "CSV: timestamp_us,dx,dy,dtheta,...")
       ->required();
   nclt_command->add_option("--out-dir", nclt.out_dir, "is made if it is not there")->required();
+  relocd::KittiOptions kitti;
+  auto* kitti_command = app.add_subcommand(
+      "kitti", "a trajectory of KITTI's odometry benchmark: the camera's path in the plane");
+  kitti_command->add_option("--poses", kitti.poses, "12 numbers a line: 3x4, camera to world")
+      ->required();
+  kitti_command->add_option("--rate-hz", kitti.rate_hz, "of the lines")->capture_default_str();
+  kitti_command->add_option("--out", kitti.out, "CSV: t_s,x_m,y_m,theta_rad")->required();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? relocd::kExitOk : relocd::kExitUsage;
   }
-  if (auto ok = relocd::ImportNclt(nclt); !ok) {
-    fmt::print(stderr, "reloc import nclt: {}\n", ok.error().message);
+  const bool is_kitti = kitti_command->parsed();
+  const auto ok = is_kitti ? relocd::ImportKitti(kitti) : relocd::ImportNclt(nclt);
+  if (!ok) {
+    fmt::print(stderr, "reloc import {}: {}\n", is_kitti ? "kitti" : "nclt", ok.error().message);
     return relocd::ExitCode(ok.error());
   }
   return relocd::kExitOk;

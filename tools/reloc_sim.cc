@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   relocd::AddSimDrive(app, command_line, command);
   relocd::AddSimAgain(app, command);
   relocd::AddSimWheels(app, command);
+  relocd::AddSimFixes(app, command);
   relocd::AddSimPlay(app, command);
   relocd::AddSimView(app, command);
   try {

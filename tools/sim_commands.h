@@ -25,6 +25,9 @@ void AddSimAgain(CLI::App& app, SimCommand& command);
 /// `wheels`: the CAN frames of the wheels along a trajectory from a file.
 void AddSimWheels(CLI::App& app, SimCommand& command);
 
+/// `fixes`: what a camera finds in a map along a trajectory from a file.
+void AddSimFixes(CLI::App& app, SimCommand& command);
+
 /// `play`: a recorded drive on the devices of a robot, on the wall clock.
 void AddSimPlay(CLI::App& app, SimCommand& command);
 
