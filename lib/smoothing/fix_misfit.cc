@@ -12,6 +12,9 @@ namespace {
 
 constexpr double kReach = 10.0;  // s; errors were seen to last 3 to 8 s
 constexpr double kUsualMisfit = 8.0;
+/// Fixes that are believed less than this cannot hold an estimate that is wrong, and so pull even
+/// less: the odometry would be followed away from all of them.
+constexpr double kMostMisfit = 30.0;
 constexpr double kUsualWeight = 10.0;  // in fixes
 
 Eigen::Vector2d WhitenedError(const KeyframeWindow& window, const AttachedFix& fix) {
@@ -62,7 +65,7 @@ double FixMisfit::Estimate(const KeyframeWindow& window, const FixWeighting& wei
   }
   const double misfit = (squared / weighting.ExpectedSquaredPull() + kUsualWeight * kUsualMisfit) /
                         (shares + kUsualWeight);
-  return scatter_factor * std::max(1.0, misfit);
+  return std::min(kMostMisfit, scatter_factor * std::max(1.0, misfit));
 }
 
 }  // namespace relocd

@@ -11,7 +11,7 @@ namespace relocd {
 /// badly, average out more slowly than their number says. Thread-bound.
 class FixMisfit {
  public:
-  /// @return at least 1: the long-run variance of the fixes' pulls, with weights that fall
+  /// @return in [1, 30]: the long-run variance of the fixes' pulls, with weights that fall
   /// exponentially with the time between two (a kernel as in Newey and West, 1987), over that
   /// expected. With few fixes it leans on what is usual for scene coordinates.
   double Estimate(const KeyframeWindow& window, const FixWeighting& weighting);
