@@ -162,6 +162,40 @@ def camera_removed_and_back():
     _check_camera_came_back(_feed()[1], pid)
 
 
+def one_of_two_cameras_unplugged():
+    """Both are named by links that stay the same, as udev makes them in /dev/v4l/by-id."""
+    links = pathlib.Path("/dev/v4l/by-id")
+    links.mkdir(parents=True)
+    for number, name in enumerate(("front", "rear")):
+        (links / name).symlink_to(f"/dev/video{number}")
+    shipped = (machine.SOURCE / "packaging/robot.yaml").read_text()
+    two = shipped.replace("    device: /dev/video0 ", "    device: /dev/v4l/by-id/front ").replace(
+        "\ncan:\n", "  rear:\n    device: /dev/v4l/by-id/rear\n\ncan:\n")
+    make_can()
+    deploy(config=two, ready="5/5")
+    players = [start("reloc", "sim", "play", "--dataset", drive(), "--live-video", f"/dev/video{number}", stdout=subprocess.DEVNULL) for number in (0, 1)]
+
+    def frames():
+        return {name: said["values"]["frames"] for name, said in statuses().items() if name.startswith("camerad_")}
+    wait_until(lambda: len(frames()) == 2 and min(frames().values()) > 5, "images come from both", 20)
+    _end(players[1])
+    (links / "rear").unlink()
+    time.sleep(2.0)
+    said = statuses()
+    check(said["camerad_rear"]["level"] == "ERROR" and said["camerad_front"]["level"] == "OK", f"one is gone: {said['camerad_rear']['message']}")
+    before = frames()
+    time.sleep(1.0)
+    after = frames()
+    check(after["camerad_front"] > before["camerad_front"], "the other goes on")
+    # It comes back under another number.
+    _end(players[0])
+    wait_until(lambda: "capabilities" in statuses()["camerad_front"]["message"], "camerad lets the device go")
+    (links / "front").unlink()
+    (links / "rear").symlink_to("/dev/video0")
+    start("reloc", "sim", "play", "--dataset", drive(), "--live-video", "/dev/video0", stdout=subprocess.DEVNULL)
+    wait_until(lambda: frames()["camerad_rear"] > after["camerad_rear"] + 5, "it is found by its link, under another number", 15)
+
+
 def _ready_times_s(name):
     """CLOCK_MONOTONIC at which relocd said that a daemon is ready, each time."""
     said = subprocess.run(["journalctl", "--no-pager", "-u", "relocd", "-o", "json", "--output-fields=MESSAGE"], stdout=subprocess.PIPE, text=True).stdout
