@@ -30,16 +30,16 @@ double CovarianceFactor(const SceneMap& map, const std::vector<FrameLocalization
   return ratios.empty() ? 1.0 : std::clamp(Quantile(ratios, kShare), 1.0, 1e6);
 }
 
-/// Above what mirrored images reach, but not so high that more than one in a hundred of the right
-/// poses would be refused.
+/// Well above what mirrored images reach, and well below what right poses have; where both are near
+/// to each other, above the mirrored ones, as long as hardly a right pose is refused.
 double ConfidenceThreshold(const std::vector<double>& right, const std::vector<double>& mirrored) {
-  constexpr double kMargin = 1.1;
   constexpr double kLeast = 0.03;
   constexpr double kRefusedShare = 0.01;
-  const double wanted =
-      mirrored.empty() ? kLeast : kMargin * *std::max_element(mirrored.begin(), mirrored.end());
-  const double most = right.empty() ? 1.0 : Quantile(right, kRefusedShare);
-  return std::clamp(std::min(wanted, most), kLeast, 1.0);
+  const double wrong =
+      mirrored.empty() ? kLeast : *std::max_element(mirrored.begin(), mirrored.end());
+  const double lowest_right = right.empty() ? 1.0 : Quantile(right, kRefusedShare);
+  const double between = std::max(1.1 * wrong, std::min(2.0 * wrong, 0.5 * lowest_right));
+  return std::clamp(std::min(between, lowest_right), kLeast, 1.0);
 }
 
 std::vector<FrameLocalization> OfRegion(const std::vector<FrameLocalization>& localizations,
