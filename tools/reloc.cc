@@ -25,7 +25,7 @@ struct Verb {
 };
 
 /// What is beside this program and not in here is listed too, without a help text.
-constexpr std::array<Verb, 13> kVerbs{{
+constexpr auto kVerbs = std::to_array<Verb>({
     {"status", "how the daemons are, and where the robot is"},
     {"doctor", "what this robot lacks, and the command that mends it"},
     {"check-config", "whether a robot's config is right"},
@@ -40,7 +40,7 @@ constexpr std::array<Verb, 13> kVerbs{{
     {"report", "a drive's errors, coverage and latencies: tables, plots, a page"},
     {"sim", "a drive through a simulated world: images, CAN frames, truth"},
     {"import", "bring a public data set into our layout"},
-}};
+});
 
 std::filesystem::path ProgramDirectory() {
   std::error_code error;
