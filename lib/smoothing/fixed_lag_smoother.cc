@@ -109,7 +109,8 @@ FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
       consensus_options_{.radius_sigmas = config.relocalization_radius_sigmas,
                          .min_radius_m = config.relocalization_min_radius_m},
       history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
-      chain_(static_cast<std::size_t>(config.window_keyframes) + 1) {
+      chain_(static_cast<std::size_t>(config.window_keyframes) + 1),
+      drift_(config.odometry_drift_sigma_rad_per_m, config.odometry_scale_sigma) {
   const auto keyframes = static_cast<std::size_t>(config.window_keyframes) + 1;
   window_.keyframes.Reserve(keyframes);
   window_.fixes.Reserve(keyframes * kUsualFixesPerKeyframe);
@@ -180,11 +181,12 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
                              step.X_BprevB.y(),
                              step.X_BprevB.yaw())};
   }
+  const Pose2 X_BprevB = drift_.Correct(step.X_BprevB);
   OdometrySample sample = history_.newest();
   sample.time = step.time;
-  sample.X_OB = sample.X_OB * step.X_BprevB;
-  sample.X_KB = sample.X_KB * step.X_BprevB;
-  sample.covariance_KB = ComposeCovariance(sample.covariance_KB, step.X_BprevB, covariance);
+  sample.X_OB = sample.X_OB * X_BprevB;
+  sample.X_KB = sample.X_KB * X_BprevB;
+  sample.covariance_KB = ComposeCovariance(sample.covariance_KB, X_BprevB, covariance);
   sample.step_covariance = covariance;
   odometer_m_ += step.X_BprevB.translation().norm();
 
@@ -218,6 +220,9 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
   keyframe.time = sample.time;
   keyframe.generation = before.generation;
   keyframe.X_OB = sample.X_OB;
+  keyframe.odometer_m = odometer_m_;
+  keyframe.corrected_turn_rad = drift_.corrected_turn_rad();
+  keyframe.corrected_way_m = drift_.corrected_way_m();
   keyframe.X_PK = sample.X_KB;
   keyframe.covariance_PK = sample.covariance_KB;
   keyframe.SetX_WK(before.X_WK() * sample.X_KB);
@@ -511,6 +516,7 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
     const double misfit = misfit_.Estimate(window_, weighting_);
     const double change = std::abs(misfit / weighting_.misfit() - 1.0);
     if (change > kMisfitChange) weighting_.SetMisfit(misfit);
+    drift_.Estimate(window_, newest_covariance_);
   }
   if (chain_.Solve(window_, weighting_, max_iterations)) {
     newest_covariance_ = chain_.NewestCovariance();

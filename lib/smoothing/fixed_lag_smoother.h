@@ -19,6 +19,7 @@
 #include "smoothing/fix.h"
 #include "smoothing/fix_misfit.h"
 #include "smoothing/keyframe_window.h"
+#include "smoothing/odometry_drift.h"
 #include "smoothing/pose_history.h"
 #include "smoothing/smoother_config.h"
 
@@ -121,6 +122,7 @@ class FixedLagSmoother {
   [[nodiscard]] KeyframeWindow TakeWindow() && { return std::move(window_); }
   [[nodiscard]] const SmootherConfig& config() const { return config_; }
   [[nodiscard]] const FixWeighting& weighting() const { return weighting_; }
+  [[nodiscard]] const OdometryDrift& drift() const { return drift_; }
 
  private:
   void Begin(MonotonicTime time);
@@ -168,6 +170,7 @@ class FixedLagSmoother {
   KeyframeWindow window_;
   ChainSolver chain_;
   FixMisfit misfit_;
+  OdometryDrift drift_;
   int fixes_until_misfit_ = 0;
   int extrapolated_fixes_ = 0;                                   ///< In the window.
   Eigen::Matrix3d newest_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the newest keyframe.

@@ -24,6 +24,9 @@ struct Keyframe {
   Eigen::Vector3d x_WK = Eigen::Vector3d::Zero();  ///< The estimate X_WK: x, y, unwrapped yaw.
   Pose2 X_PK;                                      ///< The motion from the keyframe before (P).
   Eigen::Matrix3d covariance_PK = Eigen::Matrix3d::Identity();
+  double odometer_m = 0.0;          ///< The way until here.
+  double corrected_turn_rad = 0.0;  ///< Put into the odometry until here, by OdometryDrift.
+  double corrected_way_m = 0.0;     ///< Likewise.
   /// How often the estimates had been started anew when this one was last estimated.
   std::int64_t generation = 0;
   int fixes = 0;        ///< That are attached to it and have influence.

@@ -182,7 +182,7 @@ std::string FormatEstimatesCsv(const std::vector<SmootherEstimate>& estimates) {
       "time_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,status\n";
   for (const SmootherEstimate& estimate : estimates) {
     fmt::format_to(std::back_inserter(text), "{}", ToNanoseconds(estimate.time));
-    if (estimate.has_pose) {
+    if (estimate.has_pose && estimate.status != SmootherStatus::kUninitialised) {
       const Eigen::Matrix3d& c = estimate.covariance;
       fmt::format_to(std::back_inserter(text),
                      ",{:.6f},{:.6f},{:.8f},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}",

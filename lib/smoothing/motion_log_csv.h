@@ -37,7 +37,7 @@ Result<MotionLog> ReadMotionLog(const std::string& odometry_path,
                                 const SmootherConfig& config);
 
 /// `time_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_xt,cov_yy,cov_yt,cov_tt,status`, the covariance
-/// of the right perturbation; the cells of a row without pose are empty.
+/// of the right perturbation; the cells of a row without pose, or with a position alone, are empty.
 std::string FormatEstimatesCsv(const std::vector<SmootherEstimate>& estimates);
 
 }  // namespace relocd

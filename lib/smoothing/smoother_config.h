@@ -43,7 +43,7 @@ struct OdometryNoiseConfig {
 /// The window, what it believes, and when it stops believing.
 struct SmootherConfig {
   int window_keyframes = 450;
-  double keyframe_distance_m = 0.5;
+  double keyframe_distance_m = 1.0;
   double keyframe_angle_rad = 0.15;
   double keyframe_interval_s = 2.0;
   int max_iterations = 2;
@@ -56,7 +56,9 @@ struct SmootherConfig {
   double max_extrapolation_s = 0.5;
   double default_fix_sigma_m = 7.0;
   double default_fix_heading_sigma_rad = 0.05;
-  double odometry_covariance_factor = 4.0;
+  double odometry_covariance_factor = 2.0;
+  double odometry_drift_sigma_rad_per_m = 0.005;
+  double odometry_scale_sigma = 0.01;
   OdometryNoiseConfig default_odometry_noise;
 
   int start_fixes = 3;
@@ -98,6 +100,13 @@ struct SmootherConfig {
     visit("odometry_covariance_factor",
           self.odometry_covariance_factor,
           "> 0; multiplies every odometry covariance: above 1 for errors that are not independent");
+    visit(
+        "odometry_drift_sigma_rad_per_m",
+        self.odometry_drift_sigma_rad_per_m,
+        ">= 0; of a constant turn that the odometry gets wrong, which is estimated; 0: it is not");
+    visit("odometry_scale_sigma",
+          self.odometry_scale_sigma,
+          ">= 0; of a constant part of the travel that the odometry misses, likewise");
     visit("default_odometry_noise",
           self.default_odometry_noise,
           "for odometry files without covariances");

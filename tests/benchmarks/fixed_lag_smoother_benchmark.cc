@@ -62,6 +62,7 @@ class Driver {
   static SmootherConfig MakeConfig(int window_keyframes) {
     SmootherConfig config;
     config.window_keyframes = window_keyframes;
+    config.keyframe_distance_m = 0.5;
     return config;
   }
 

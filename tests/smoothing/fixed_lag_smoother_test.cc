@@ -221,13 +221,13 @@ TEST(FixedLagSmootherTest, RecoversFromAConfidentWrongPrior) {
   }
 }
 
-/// The fixes until the estimate is near the truth again after the body was carried 35 m.
+/// The fixes until the estimate is near the truth again after the body was carried 60 m.
 int FixesUntilFound(bool has_heading, unsigned seed) {
   DriveOptions options{.duration_s = 120.0, .has_heading = has_heading};
   const auto before = DriveSimulator(options, seed).Run();
   FixedLagSmoother smoother{SmootherConfig()};
   Drive(before, smoother);
-  options.X_WB0 = before.X_WB_end * Pose2(-20.0, 30.0, 1.5);
+  options.X_WB0 = before.X_WB_end * Pose2(-36.0, 48.0, 1.5);
   auto after = DriveSimulator(options, seed + 100).Run();
   const Duration shift =
       before.log.odometry.back().time - after.log.odometry.front().time + milliseconds(50);
@@ -314,6 +314,79 @@ TEST(FixedLagSmootherTest, RefusesWhatIsNotFinite) {
   EXPECT_EQ(smoother.Estimate().X_WB.translation(), before.translation());
 
   EXPECT_FALSE(smoother.Reset({.X_WB = Pose2(), .covariance = Eigen::Matrix3d::Zero()}));
+}
+
+TEST(FixedLagSmootherTest, RefusesWhatComesBeforeOrLongAfterTheOdometry) {
+  const auto drive = DriveSimulator({}, 14).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  EXPECT_EQ(smoother.AddFix(drive.log.fixes.front()), FixOutcome::kAhead);  // no odometry yet
+  const SmootherEstimate before = Drive(drive, smoother);
+  Fix fix = drive.log.fixes.back();
+  for (const int hours : {-1000, -2, 2, 1000}) {
+    fix.time = drive.log.fixes.back().time + std::chrono::hours(hours);
+    EXPECT_EQ(smoother.AddFix(fix), hours < 0 ? FixOutcome::kLate : FixOutcome::kAhead) << hours;
+  }
+  EXPECT_EQ(smoother.counters().fixes_late, 2);
+  EXPECT_EQ(smoother.counters().fixes_ahead, 3);
+  OdometryStep step = drive.log.odometry.back();
+  step.time -= std::chrono::hours(3);
+  EXPECT_FALSE(smoother.AddOdometry(step));
+  EXPECT_EQ(smoother.counters().odometry_refused, 1);
+  EXPECT_EQ(smoother.Estimate().X_WB.translation(), before.X_WB.translation());
+  // Hours in which nothing came: the body has not moved further than the odometry says.
+  step = drive.log.odometry.back();
+  step.time += std::chrono::hours(3);
+  EXPECT_TRUE(smoother.AddOdometry(step));
+  EXPECT_EQ(smoother.Estimate().status, SmootherStatus::kDeadReckoning);
+  EXPECT_TRUE(smoother.Estimate().X_WB.translation().allFinite());
+}
+
+TEST(FixedLagSmootherTest, OdometryThatStopsLeavesFixesOutAndGoesOn) {
+  const auto drive = DriveSimulator({}, 15).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  const std::size_t half = drive.log.odometry.size() / 2;
+  const MonotonicTime stop = drive.log.odometry[half].time;
+  std::size_t step = 0;
+  for (const Fix& fix : drive.log.fixes) {
+    for (; step <= half && drive.log.odometry[step].time <= fix.time; ++step)
+      ASSERT_TRUE(smoother.AddOdometry(drive.log.odometry[step]));
+    const FixOutcome outcome = smoother.AddFix(fix);
+    if (fix.time > stop + seconds(1)) {
+      EXPECT_EQ(outcome, FixOutcome::kAhead);
+    }
+    EXPECT_TRUE(smoother.Estimate().X_WB.translation().allFinite());
+  }
+  EXPECT_GT(smoother.counters().fixes_ahead, 50);
+}
+
+/// The drive's odometry, as wheels of another radius than the config's measure it.
+void Distort(double rad_per_m, double scale, std::vector<OdometryStep>& odometry) {
+  for (OdometryStep& step : odometry) {
+    const Pose2& motion = step.X_BprevB;
+    step.X_BprevB = Pose2(scale * motion.x(),
+                          scale * motion.y(),
+                          motion.yaw() + rad_per_m * motion.translation().norm());
+  }
+}
+
+TEST(FixedLagSmootherTest, LearnsTheOdometrysConstantErrors) {
+  std::vector<double> learning;
+  std::vector<double> not_learning;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    auto drive = DriveSimulator({.duration_s = 300.0, .has_heading = false}, seed).Run();
+    Distort(-0.004, 0.99, drive.log.odometry);
+    FixedLagSmoother smoother{SmootherConfig()};
+    const SmootherEstimate estimate = Drive(drive, smoother);
+    learning.push_back(PositionError(estimate.X_WB, drive.X_WB_end));
+    EXPECT_NEAR(smoother.drift().rad_per_m(), 0.004, 0.001) << seed;
+    EXPECT_NEAR(smoother.drift().scale(), 0.01, 0.006) << seed;
+    SmootherConfig config;
+    config.odometry_drift_sigma_rad_per_m = 0.0;
+    config.odometry_scale_sigma = 0.0;
+    FixedLagSmoother other(config);
+    not_learning.push_back(PositionError(Drive(drive, other).X_WB, drive.X_WB_end));
+  }
+  EXPECT_LT(Summarize(learning).rmse, Summarize(not_learning).rmse);
 }
 
 TEST(FixedLagSmootherTest, SaysHowFarItKnowsItsPose) {

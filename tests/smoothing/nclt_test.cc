@@ -132,6 +132,83 @@ TEST_F(NcltTest, SmoothedRmseIsBelowAThirdOfTheReleasedOne) {
   EXPECT_LT(ours.rmse, theirs.rmse / 3.0);
 }
 
+/// From a fix on, the estimates' errors are below this, or it has not been found again.
+constexpr double kFound = 10.0;  // m
+constexpr int kMostImages = 35;
+
+/// So many fixes after `first` the error is below `kFound`.
+int ImagesUntilFound(const std::vector<SmootherEstimate>& estimates,
+                     const std::vector<Eigen::Vector2d>& truth,
+                     std::size_t first) {
+  for (std::size_t i = first; i < estimates.size(); ++i) {
+    if ((estimates[i].X_WB.translation() - truth[i]).norm() < kFound)
+      return static_cast<int>(i - first);
+  }
+  return -1;
+}
+
+TEST_F(NcltTest, ACarriedRobotIsFoundAgainAndSaysSo) {
+  for (const Eigen::Vector2d& carried : {Eigen::Vector2d(60.0, 0.0), Eigen::Vector2d(0.0, -60.0)}) {
+    NcltRun run = run_;
+    constexpr std::size_t kFirst = 600;
+    for (std::size_t i = kFirst; i < run.truth.size(); ++i) {
+      run.truth[i] += carried;
+      const Eigen::Vector2d p_WM = run.log.fixes[i].X_WB.translation() + carried;
+      run.log.fixes[i].X_WB = Pose2(p_WM.x(), p_WM.y(), 0.0);
+    }
+    const std::vector<SmootherEstimate> estimates = SmoothCausally(run.log, config_);
+    const int images = ImagesUntilFound(estimates, run.truth, kFirst);
+    std::cout << "carried by 60 m: found again after " << images << " images\n";
+    EXPECT_GE(images, 0);
+    EXPECT_LE(images, kMostImages);
+    bool was_lost = false;
+    for (std::size_t i = kFirst; i < kFirst + kMostImages; ++i)
+      was_lost = was_lost || estimates[i].status == SmootherStatus::kLost;
+    EXPECT_TRUE(was_lost);
+  }
+}
+
+/// The run from row 300 on, from where the predictions are usable.
+TEST_F(NcltTest, APriorAHundredMetresOffAndTurnedIsOverruled) {
+  constexpr std::size_t kFirst = 300;
+  FixedLagSmoother smoother(config_);
+  const Pose2 wrong(
+      run_.truth[kFirst].x() + 80.0, run_.truth[kFirst].y() - 60.0, 1.68);  // by 180 deg
+  std::size_t step = 0;
+  std::vector<SmootherEstimate> estimates;
+  std::vector<Eigen::Vector2d> truth;
+  for (std::size_t i = kFirst; i < run_.truth.size(); ++i) {
+    for (;
+         step < run_.log.odometry.size() && run_.log.odometry[step].time <= run_.log.fixes[i].time;
+         ++step) {
+      if (run_.log.odometry[step].time < run_.log.fixes[kFirst - 1].time) continue;
+      ASSERT_TRUE(smoother.AddOdometry(run_.log.odometry[step]));
+    }
+    if (i == kFirst) {
+      ASSERT_TRUE(smoother.Reset(
+          {.X_WB = wrong, .covariance = Eigen::Vector3d(1.0, 1.0, 0.0025).asDiagonal()}));
+    }
+    smoother.AddFix(run_.log.fixes[i]);
+    estimates.push_back(smoother.Estimate());
+    truth.push_back(run_.truth[i]);
+  }
+  const int images = ImagesUntilFound(estimates, truth, 0);
+  std::cout << "prior 100 m and far turned: found after " << images << " images\n";
+  EXPECT_GE(images, 0);
+  EXPECT_LE(images, kMostImages);
+}
+
+TEST_F(NcltTest, NothingIsStartedAnewWhereNothingHappened) {
+  FixedLagSmoother smoother(config_);
+  std::size_t step = 0;
+  for (const Fix& fix : run_.log.fixes) {
+    for (; step < run_.log.odometry.size() && run_.log.odometry[step].time <= fix.time; ++step)
+      ASSERT_TRUE(smoother.AddOdometry(run_.log.odometry[step]));
+    smoother.AddFix(fix);
+  }
+  EXPECT_EQ(smoother.counters().relocalizations, 0);
+}
+
 TEST_F(NcltTest, GivesTheSameBitsTwice) {
   run_.log.fixes.resize(250);
   const std::vector<SmootherEstimate> first = SmoothCausally(run_.log, config_);

@@ -1,0 +1,60 @@
+#include "smoothing/odometry_drift.h"
+
+#include <cstddef>
+
+#include "geometry/angle.h"
+
+namespace relocd {
+namespace {
+
+/// How far the estimates of all motions differ from the odometry.
+struct Residuals {
+  double turn_rad = 0.0;
+  double way_m = 0.0;
+};
+
+Residuals SumResiduals(const KeyframeWindow& window) {
+  Residuals sum;
+  for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
+    const Keyframe& keyframe = window.keyframes[i];
+    if (keyframe.is_cut) continue;
+    const Pose2 X_PK = window.keyframes[i - 1].X_WK().Inverse() * keyframe.X_WK();
+    sum.turn_rad += WrapAngle(X_PK.yaw() - keyframe.X_PK.yaw());
+    const Eigen::Vector2d& odometry = keyframe.X_PK.translation();
+    const double length = odometry.norm();
+    if (length > 0.0) sum.way_m += (X_PK.translation() - odometry).dot(odometry) / length;
+  }
+  return sum;
+}
+
+/// The most likely value under a prior about zero, of which `measured` has the variance given.
+double Shrink(double measured, double variance, double prior) {
+  return prior > 0.0 ? measured * prior * prior / (prior * prior + variance) : 0.0;
+}
+
+}  // namespace
+
+Pose2 OdometryDrift::Correct(const Pose2& X_BprevB) {
+  const double way = X_BprevB.translation().norm();
+  corrected_turn_rad_ += rad_per_m_ * way;
+  corrected_way_m_ += scale_ * way;
+  const Eigen::Vector2d translation = (1.0 + scale_) * X_BprevB.translation();
+  return {translation.x(), translation.y(), X_BprevB.yaw() + rad_per_m_ * way};
+}
+
+void OdometryDrift::Estimate(const KeyframeWindow& window, const Eigen::Matrix3d& covariance) {
+  const Keyframe& oldest = window.keyframes.front();
+  const Keyframe& newest = window.keyframes.back();
+  const double way_m = newest.odometer_m - oldest.odometer_m;
+  constexpr double kShortestWay = 10.0;  // a body that hardly moved tells nothing
+  if (way_m < kShortestWay) return;
+  const Residuals residuals = SumResiduals(window);
+  const double turn = newest.corrected_turn_rad - oldest.corrected_turn_rad + residuals.turn_rad;
+  const double way = newest.corrected_way_m - oldest.corrected_way_m + residuals.way_m;
+  // Both ends of the window are known no better than its newest keyframe.
+  const double per_squared_way = 2.0 / (way_m * way_m);
+  rad_per_m_ = Shrink(turn / way_m, per_squared_way * covariance(2, 2), prior_rad_per_m_);
+  scale_ = Shrink(way / way_m, per_squared_way * covariance(0, 0), prior_scale_);
+}
+
+}  // namespace relocd

@@ -1,0 +1,44 @@
+#pragma once
+
+#include "geometry/pose2.h"
+#include "smoothing/keyframe_window.h"
+
+namespace relocd {
+
+/// By how much, for each metre of the way, the odometry turns and travels less than the body does:
+/// of wheels whose radii are not what the config says. Half a percent of difference between the
+/// wheels of a car turns it by 15 degrees over a hundred metres, which no random walk explains.
+///
+/// Estimated from what the window's fixes turned and stretched the chain by, as constants with
+/// Gaussian priors about zero, and put right in the odometry that comes. Thread-bound.
+class OdometryDrift {
+ public:
+  /// @param prior_rad_per_m  standard deviation of the turn of any robot; 0 switches it off.
+  /// @param prior_scale      likewise of the part that is missing of the travel.
+  OdometryDrift(double prior_rad_per_m, double prior_scale)
+      : prior_rad_per_m_(prior_rad_per_m), prior_scale_(prior_scale) {}
+
+  /// Puts a motion right.
+  [[nodiscard]] Pose2 Correct(const Pose2& X_BprevB);
+
+  /// Estimates the drift anew. Costs a look at each keyframe.
+  ///
+  /// @param covariance  of the newest keyframe: how well the window's ends are known.
+  void Estimate(const KeyframeWindow& window, const Eigen::Matrix3d& covariance);
+
+  [[nodiscard]] double rad_per_m() const { return rad_per_m_; }
+  [[nodiscard]] double scale() const { return scale_; }
+  /// What has been put into the motions so far.
+  [[nodiscard]] double corrected_turn_rad() const { return corrected_turn_rad_; }
+  [[nodiscard]] double corrected_way_m() const { return corrected_way_m_; }
+
+ private:
+  double prior_rad_per_m_;
+  double prior_scale_;
+  double rad_per_m_ = 0.0;
+  double scale_ = 0.0;
+  double corrected_turn_rad_ = 0.0;
+  double corrected_way_m_ = 0.0;
+};
+
+}  // namespace relocd
