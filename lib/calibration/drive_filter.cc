@@ -195,8 +195,8 @@ DriveFit DriveFilter::Run(const DriveParameters& parameters, const DriveNoise& n
       now = next;
     }
     const Innovation innovation = Innovate(state.X_WB, X_BR, references_[k], noise);
-    const Eigen::MatrixXd& H = innovation.jacobian;
-    const Eigen::MatrixXd predicted = H * state.covariance * H.transpose();
+    const Eigen::MatrixXd& jacobian = innovation.jacobian;
+    const Eigen::MatrixXd predicted = jacobian * state.covariance * jacobian.transpose();
     Eigen::VectorXd variance = innovation.variance;
     Eigen::LLT<Eigen::MatrixXd> llt(predicted + Eigen::MatrixXd(variance.asDiagonal()));
     const double distance = llt.matrixL().solve(innovation.residual).norm();
@@ -210,9 +210,9 @@ DriveFit DriveFilter::Run(const DriveParameters& parameters, const DriveNoise& n
     row += whitened.size();
     fit.cost += whitened.squaredNorm() +
                 2.0 * Eigen::MatrixXd(llt.matrixL()).diagonal().array().log().sum();
-    const Eigen::MatrixXd gain = llt.solve(H * state.covariance).transpose();
+    const Eigen::MatrixXd gain = llt.solve(jacobian * state.covariance).transpose();
     state.X_WB = state.X_WB * Pose2::Exp(gain * innovation.residual);
-    const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * H;
+    const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * jacobian;
     // Joseph's form, which stays positive definite.
     state.covariance = rest * state.covariance * rest.transpose() +
                        gain * variance.asDiagonal() * gain.transpose();

@@ -266,9 +266,9 @@ Extent Measure(const std::vector<ReferencePose>& references) {
   for (std::size_t i = 0; i < references.size(); ++i) {
     extent.has_heading = extent.has_heading && references[i].has_heading;
     if (i == 0) continue;
-    const Pose2 X_ij = references[i - 1].X_WR.Inverse() * references[i].X_WR;
-    extent.length_m += X_ij.translation().norm();
-    extent.turn_rad += std::abs(X_ij.yaw());
+    const Pose2 X_RiRj = references[i - 1].X_WR.Inverse() * references[i].X_WR;
+    extent.length_m += X_RiRj.translation().norm();
+    extent.turn_rad += std::abs(X_RiRj.yaw());
   }
   return extent;
 }
