@@ -50,21 +50,15 @@ void CastShadow(Draws& draws, cv::Mat& image) {
   cv::multiply(image, shadow, image);
 }
 
-/// Puts a part of the image, or one gray, somewhere else, as a car or a person would hide what is
-/// there, or something on the lens.
+/// Puts a part of the image somewhere else, as a car or a person would hide what is there.
 void Occlude(Draws& draws, cv::Mat& image) {
-  constexpr double kPlainShare = 0.3;
-  const int width = image.cols * (4 + draws.Below(28)) / 100;
-  const int height = image.rows * (6 + draws.Below(26)) / 100;
+  const int width = image.cols * (4 + draws.Below(14)) / 100;
+  const int height = image.rows * (6 + draws.Below(20)) / 100;
   const cv::Rect from(
       draws.Below(image.cols - width), draws.Below(image.rows - height), width, height);
   const cv::Rect to(
       draws.Below(image.cols - width), draws.Below(image.rows - height), width, height);
-  if (draws.Unit() < kPlainShare) {
-    image(to).setTo(kWhite * draws.Unit());
-  } else {
-    image(from).clone().copyTo(image(to));
-  }
+  image(from).clone().copyTo(image(to));
 }
 
 }  // namespace

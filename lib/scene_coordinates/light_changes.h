@@ -13,8 +13,8 @@ struct LightChanges {
   double shading = 0.7;   ///< >= 0; logarithm of a factor that varies slowly over the image.
   int shadows = 3;        ///< >= 0; edges of cast shadows.
   double haze = 0.35;     ///< In [0, 1); part of the contrast that is lost.
-  double noise = 10.0;    ///< >= 0; standard deviation, gray levels.
-  int occluders = 4;      ///< >= 0; patches of the image, or gray ones, put where others are.
+  double noise = 6.0;     ///< >= 0; standard deviation, gray levels.
+  int occluders = 3;      ///< >= 0; patches of the image put where others are.
 };
 
 /// Changes the light of an image as another hour, another weather and others on the road would.

@@ -214,10 +214,7 @@ cv::Matx23f Preparation::ChangeView(std::mt19937_64& engine, std::vector<float>&
   std::uniform_real_distribution<double> symmetric(-1.0, 1.0);
   const double scale = std::pow(config_.max_scale, symmetric(engine));
   const double roll_rad = config_.max_roll_rad * symmetric(engine);
-  const double working_per_image_px =
-      static_cast<double>(features_.working_width) / features_.image_width;
-  const double strength = symmetric(engine) * symmetric(engine);  // most images are nearly sharp
-  const double blur_px = config_.max_blur_px * working_per_image_px * std::abs(strength);
+  const double blur_px = config_.max_blur_px * std::abs(symmetric(engine));
   const double shift_u = features_.cell_stride * symmetric(engine);
   const double shift_v = features_.cell_stride * symmetric(engine);
 

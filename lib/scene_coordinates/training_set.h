@@ -46,7 +46,7 @@ struct TrainingSetConfig {
   int views_per_image = 6;     ///< > 0; the first is the image as it is.
   double max_scale = 1.35;     ///< >= 1; copies are enlarged or reduced by up to this factor.
   double max_roll_rad = 0.12;  ///< >= 0
-  double max_blur_px = 2.0;    ///< >= 0; standard deviation in pixels of the camera's image.
+  double max_blur_px = 1.2;    ///< >= 0; standard deviation in working pixels.
   LightChanges light;          ///< Of the copies.
   bool measure_depth = true;   ///< Find depths between neighbouring images by their poses.
   std::uint64_t seed = 1;
