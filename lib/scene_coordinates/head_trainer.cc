@@ -50,6 +50,16 @@ void Narrow(const float* in, std::size_t size, float* out) {
   std::copy_n(in, size, out);
 }
 
+/// A feature as the network takes it.
+template <typename Number>
+Number As(Bfloat16 value) {
+  if constexpr (std::is_same_v<Number, Bfloat16>) {
+    return value;
+  } else {
+    return ToFloat(value);
+  }
+}
+
 /// The one cycle of the learning rates, as a share of the highest: up along a line, down along a
 /// cosine.
 double RateShare(const HeadTrainerConfig& config, int iteration) {
@@ -204,13 +214,11 @@ template <typename Number>
 Head Trainer<Number>::Run() {
   std::barrier<> barrier(std::ssize(networks_));
   BeginStep();
-  {
-    std::vector<std::jthread> threads;
-    for (std::size_t thread = 1; thread < networks_.size(); ++thread) {
-      threads.emplace_back([this, thread, &barrier] { RunThread(thread, barrier); });
-    }
-    RunThread(0, barrier);
-  }
+  std::vector<std::jthread> threads;
+  for (std::size_t thread = 1; thread < networks_.size(); ++thread)
+    threads.emplace_back([this, thread, &barrier] { RunThread(thread, barrier); });
+  RunThread(0, barrier);
+  threads.clear();  // joins them
   UnflattenHead(layout_, parameters_, head_);
   return std::move(head_);
 }
@@ -233,23 +241,17 @@ void Trainer<Number>::RunThread(std::size_t thread, std::barrier<>& barrier) {
 template <typename Number>
 void Trainer<Number>::RunShard(std::size_t thread, std::size_t shard) {
   const auto rows = static_cast<std::size_t>(config_.batch / kTrainerShards);
-  const auto cells = std::span(order_).subspan(next_in_order_ + shard * rows, rows);
+  const auto cells =
+      std::span<const std::uint32_t>(order_).subspan(next_in_order_ + shard * rows, rows);
   ShardNetwork<Number>& network = *networks_[thread];
   const auto dimension = static_cast<std::size_t>(set_.dimension);
   for (std::size_t row = 0; row < rows; ++row) {
     const Bfloat16* features = set_.features.data() + cells[row] * dimension;
-    if constexpr (std::is_same_v<Number, Bfloat16>) {
-      std::copy_n(features, dimension, network.InputRow(row).begin());
-    } else {
-      std::transform(
-          features, features + dimension, network.InputRow(row).begin(), [](Bfloat16 value) {
-            return ToFloat(value);
-          });
-    }
+    std::transform(features, features + dimension, network.InputRow(row).begin(), As<Number>);
   }
   losses_[shard]->Begin(loss_config_, cells);
   network.Run(*losses_[shard],
-              std::span(gradients_).subspan(shard * layout_.size(), layout_.size()));
+              std::span<float>(gradients_).subspan(shard * layout_.size(), layout_.size()));
 }
 
 template <typename Number>
@@ -261,7 +263,8 @@ void Trainer<Number>::UpdateLayers(std::size_t thread) {
     const std::size_t begin = layout_.WeightsBegin(index);
     const std::size_t end = layer + 1 == layers ? layout_.size() : layout_.WeightsBegin(index + 1);
     AverageShards(gradients_.data() + begin, layout_.size(), end - begin, mean);
-    optimizer_.UpdateLayer(index, step_, std::span(gradients_).first(layout_.size()), parameters_);
+    optimizer_.UpdateLayer(
+        index, step_, std::span<float>(gradients_).first(layout_.size()), parameters_);
     Narrow(parameters_.data() + begin, end - begin, narrow_parameters_.data() + begin);
   }
 }

@@ -47,9 +47,10 @@ SceneLoss EvaluateSceneLoss(const SceneLossConfig& config,
                             const TrainingTarget& target,
                             std::span<const float, kHeadOutputs> output) {
   const float homogeneous = HomogeneousScale(output[3]);
-  const Eigen::Vector3f p_CentreP =
+  // O is the head's centre.
+  const Eigen::Vector3f p_OP =
       Eigen::Vector3f(output[0], output[1], output[2]) * (config.scale_m / homogeneous);
-  const Eigen::Vector3f p_CP = camera.R_CW * p_CentreP + camera.p_CCentre;
+  const Eigen::Vector3f p_CP = camera.R_CW * p_OP + camera.p_CCentre;
   const float target_depth =
       target.inverse_depth > 0.0F ? 1.0F / target.inverse_depth : config.typical_depth_m;
 
@@ -63,33 +64,33 @@ SceneLoss EvaluateSceneLoss(const SceneLossConfig& config,
   result.valid = p_CP.z() > kMinDepthM && p_CP.z() < kMaxDepthRatio * target_depth &&
                  result.error_px < kMaxErrorPx;
 
-  Eigen::Vector3f d_p_CP;  // d loss / d p_CP
+  Eigen::Vector3f d_CP;  // d loss / d p_CP
   float error_disparity = 0.0F;
   if (result.valid) {
     const Squashed reprojection = Squash(result.error_px, config);
     result.loss = reprojection.value;
     const float d_x = config.focal_px * reprojection.slope * Sign(error_u);
     const float d_y = config.focal_px * reprojection.slope * Sign(error_v);
-    d_p_CP = Eigen::Vector3f(d_x, d_y, -(d_x * x + d_y * y)) * inverse_z;
+    d_CP = Eigen::Vector3f(d_x, d_y, -(d_x * x + d_y * y)) * inverse_z;
     if (target.inverse_depth > 0.0F) {
       const float disparity_per_inverse_depth = config.focal_px * config.depth_baseline_m;
       error_disparity = disparity_per_inverse_depth * (inverse_z - target.inverse_depth);
       const Squashed depth = Squash(std::abs(error_disparity), config);
       result.loss += config.depth_weight * depth.value;
-      d_p_CP.z() -= config.depth_weight * depth.slope * Sign(error_disparity) *
-                    disparity_per_inverse_depth * inverse_z * inverse_z;
+      d_CP.z() -= config.depth_weight * depth.slope * Sign(error_disparity) *
+                  disparity_per_inverse_depth * inverse_z * inverse_z;
     }
   } else {
     // In units of pixels too, at the target's depth.
     const float weight = config.focal_px / target_depth;
     const Eigen::Vector3f error = p_CP - Eigen::Vector3f(target.x, target.y, 1.0F) * target_depth;
     result.loss = weight * error.cwiseAbs().sum();
-    d_p_CP = weight * Eigen::Vector3f(Sign(error.x()), Sign(error.y()), Sign(error.z()));
+    d_CP = weight * Eigen::Vector3f(Sign(error.x()), Sign(error.y()), Sign(error.z()));
   }
 
-  const Eigen::Vector3f d_p_WP = camera.R_CW.transpose() * d_p_CP;
-  const Eigen::Vector3f d_output = d_p_WP * (config.scale_m / homogeneous);
-  const float d_homogeneous = -d_p_WP.dot(p_CentreP) / homogeneous;
+  const Eigen::Vector3f d_WP = camera.R_CW.transpose() * d_CP;
+  const Eigen::Vector3f d_output = d_WP * (config.scale_m / homogeneous);
+  const float d_homogeneous = -d_WP.dot(p_OP) / homogeneous;
   const bool is_right = result.valid && result.error_px < config.confident_px &&
                         std::abs(error_disparity) < config.confident_px;
   const float confidence = 1.0F / (1.0F + std::exp(-output[4]));
