@@ -28,6 +28,8 @@ struct Verb {
 constexpr auto kVerbs = std::to_array<Verb>({
     {"status", "how the daemons are, and where the robot is"},
     {"doctor", "what this robot lacks, and the command that mends it"},
+    {"set-pose", "tell smootherd where the robot is"},
+    {"reset", "let smootherd forget the pose, and start anew from the fixes"},
     {"check-config", "whether a robot's config is right"},
     {"map", "train a map from a drive, localize images in it, say what is in it"},
     {"can", "the signals of a recorded CAN bus, as the DBC file has them"},

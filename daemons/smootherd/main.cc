@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "core/parse_number.h"
 #include "daemon/daemon.h"
+#include "messaging/command_channels.h"
 #include "smootherd/saved_state.h"
 #include "smootherd/smoother_node.h"
 #include "smootherd/state_writer.h"
@@ -41,10 +42,24 @@ class SmootherDaemon final : public Daemon {
       if (!ok) return ok;
     }
     context.control_bus.Subscribe<odometry_t>(
-        channels::kOdometry, Delivery::kEvery, [this](const odometry_t& m) { node_.Handle(m); });
+        channels::kOdometry, Delivery::kEvery, [this](const odometry_t& m) {
+          const MonotonicTime begin = MonotonicClock::now();
+          node_.Handle(m);
+          node_.NotePoseLatency(MonotonicClock::now() - begin);
+        });
     context.control_bus.Subscribe<camera_pose_t>(
         channels::kCameraPose, Delivery::kEvery, [this](const camera_pose_t& m) {
+          const MonotonicTime begin = MonotonicClock::now();
           node_.Handle(m);
+          node_.NoteFixLatency(MonotonicClock::now() - begin);
+        });
+    context.control_bus.Subscribe<pose_t>(command_channels::kSetPose,
+                                          Delivery::kNewest,
+                                          [this](const pose_t& m) { node_.SetPose(m); });
+    context.control_bus.Subscribe<text_t>(
+        command_channels::kReset, Delivery::kNewest, [this](const text_t& m) {
+          LogLine(kPriorityNotice, "smootherd", "the pose is forgotten: " + m.text);
+          node_.Reset();
         });
     return {};
   }

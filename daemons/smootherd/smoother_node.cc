@@ -32,8 +32,15 @@ constexpr double kLongestCoast = 1.0;  // s
 constexpr double kLeastUprightness = 0.5;  // the cosine of 60 degrees
 /// MAP_TO_ODOM is published when it moved by more.
 constexpr double kLeastMove = 1e-6;
+/// So many messages in a row that are older than the newest one, but rise: the clock has jumped
+/// back.
+constexpr int kOldAreNew = 100;
 /// No odometry for so long is a fault.
 constexpr double kOdometryTimeout = 1.0;  // s
+/// How well somebody who sets a pose knows it: to the side of the road, and a quarter of a right
+/// angle.
+constexpr double kSetSigma = 2.0;         // m
+constexpr double kSetHeadingSigma = 0.2;  // rad
 constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
 
 Pose2 X_OBOf(const odometry_t& message) {
@@ -75,7 +82,7 @@ void SmootherNode::Restore(const SavedState& state, const std::string& boot_id) 
 
 void SmootherNode::Handle(const odometry_t& message) {
   ++counters_.odometry;
-  if (!IsFinite(message) || (last_odometry_ && message.mono_ns <= last_odometry_->mono_ns)) {
+  if (!IsFinite(message) || IsOld(message)) {
     ++counters_.odometry_refused;
     return;
   }
@@ -94,6 +101,22 @@ void SmootherNode::Handle(const odometry_t& message) {
   PublishPose(message, estimate);
   PublishLocalization(message, estimate);
   PublishMapToOdom(message.utime, estimate);
+}
+
+bool SmootherNode::IsOld(const odometry_t& message) {
+  if (!last_odometry_ || message.mono_ns > last_odometry_->mono_ns) {
+    old_in_a_row_ = 0;
+    return false;
+  }
+  old_in_a_row_ = message.mono_ns > last_old_ns_ ? old_in_a_row_ + 1 : 1;
+  last_old_ns_ = message.mono_ns;
+  if (old_in_a_row_ < kOldAreNew) return true;
+  // The newest one was of a wrong time, or all are of another clock: else none would ever be used.
+  ++counters_.clock_jumps;
+  old_in_a_row_ = 0;
+  last_odometry_.reset();
+  StartAnew();
+  return false;
 }
 
 OdometryStep SmootherNode::StepTo(const odometry_t& message) {
@@ -242,12 +265,39 @@ void SmootherNode::ChangeMap(const std::string& map_id) {
   if (is_first) return;
   // Poses of another map are of another W.
   ++counters_.map_changes;
+  StartAnew();
+}
+
+void SmootherNode::StartAnew() {
   smoother_ = FixedLagSmoother(config_.smoother);
   last_published_X_WB_.reset();
   if (!last_odometry_) return;
   OdometryStep first;
   first.time = FromNanoseconds(last_odometry_->mono_ns);
   static_cast<void>(smoother_.AddOdometry(first).has_value());
+}
+
+void SmootherNode::Reset() {
+  ++counters_.resets_asked;
+  saved_.reset();
+  StartAnew();
+}
+
+void SmootherNode::SetPose(const pose_t& message) {
+  const double* const q = message.orientation;
+  const double w = std::hypot(q[0], q[3]);
+  // Turned about the vertical alone, which is all that a pose in the plane can be.
+  const bool is_planar = std::abs(w - 1.0) < 1e-3 && std::hypot(q[1], q[2]) < 1e-3;
+  PlanarPose prior{.X_WB = Pose2(message.pos[0], message.pos[1], 2.0 * std::atan2(q[3], q[0]))};
+  prior.covariance.diagonal() << kSetSigma * kSetSigma, kSetSigma * kSetSigma,
+      kSetHeadingSigma * kSetHeadingSigma;
+  if (!last_odometry_ || !is_planar || !smoother_.Reset(prior)) {
+    ++counters_.poses_refused;
+    return;
+  }
+  ++counters_.poses_set;
+  saved_.reset();
+  PublishMapToOdom(last_odometry_->utime, smoother_.Estimate());
 }
 
 void SmootherNode::PublishPose(const odometry_t& message, const SmootherEstimate& estimate) {
@@ -295,7 +345,8 @@ void SmootherNode::PublishLocalization(const odometry_t& message,
   answer.fixes_rejected = counters.fixes_gated + counters.fixes_invalid + counters.fixes_ahead +
                           counters_.bad_pose + counters_.unknown_camera;
   answer.fixes_late = counters.fixes_late;
-  answer.resets = counters.relocalizations + counters_.map_changes;
+  answer.resets = counters.relocalizations + counters_.map_changes + counters_.clock_jumps +
+                  counters_.poses_set + counters_.resets_asked;
   answer.odometry_seq = message.seq;
   answer.odometry_run_id = message.run_id;
   answer.last_fix_seq = last_fix_seq_;
@@ -376,6 +427,7 @@ NodeStatus SmootherNode::Status(const ClockReading& now) const {
   add("status", static_cast<std::int64_t>(estimate.status));
   add("odometry", counters_.odometry);
   add("odometry_refused", counters_.odometry_refused);
+  add("clock_jumps", counters_.clock_jumps);
   add("odometry_bridged", counters_.odometry_bridged);
   add("odometry_restarts", counters_.odometry_restarts);
   add("camera_poses", counters_.camera_poses);
@@ -390,10 +442,20 @@ NodeStatus SmootherNode::Status(const ClockReading& now) const {
   add("fixes_invalid", counters.fixes_invalid);
   add("relocalizations", counters.relocalizations);
   add("map_changes", counters_.map_changes);
+  add("poses_set", counters_.poses_set);
+  add("poses_refused", counters_.poses_refused);
+  add("resets_asked", counters_.resets_asked);
   add("solver_failures", counters.solver_failures);
   add("unpublished", counters_.unpublished);
   add("window_keyframes", static_cast<std::int64_t>(smoother_.window().keyframes.size()));
   add("window_fixes", static_cast<std::int64_t>(smoother_.window().fixes.size()));
+  status.Add("odometry_to_pose_p50_ms", pose_latency_ms_.Percentile(0.5));
+  status.Add("odometry_to_pose_p99_ms", pose_latency_ms_.Percentile(0.99));
+  status.Add("fix_p50_ms", fix_latency_ms_.Percentile(0.5));
+  status.Add("fix_p99_ms", fix_latency_ms_.Percentile(0.99));
+  status.Add("odometry_drift_rad_per_m", smoother_.drift().rad_per_m());
+  status.Add("odometry_scale", smoother_.drift().scale());
+  status.Add("fix_misfit", smoother_.weighting().misfit());
   status.Add("time_since_fix_s", estimate.time_since_fix_s.value_or(-1.0));
   status.Add("position_sigma_m",
              std::sqrt(0.5 * estimate.covariance.topLeftCorner<2, 2>().trace()));

@@ -10,10 +10,12 @@
 #include "relocd/camera_pose_t.hpp"
 #include "relocd/localization_t.hpp"
 #include "relocd/odometry_t.hpp"
+#include "relocd/pose_t.hpp"
 
 #include "core/time.h"
 #include "geometry/pose2.h"
 #include "geometry/pose3.h"
+#include "messaging/latency_window.h"
 #include "messaging/message_bus.h"
 #include "messaging/node_status.h"
 #include "smootherd/saved_state.h"
@@ -47,6 +49,17 @@ class SmootherNode {
   /// Puts a fix in. Publishes MAP_TO_ODOM if that moved the odometry frame.
   void Handle(const camera_pose_t& message);
 
+  /// Somebody says where the body is, from now on: by hand, or another system. A pose that is not
+  /// usable, or one before any odometry, is counted and has no effect.
+  void SetPose(const pose_t& message);
+
+  /// Forgets the pose, and starts anew from the fixes that come.
+  void Reset();
+
+  /// Takes note of how long it took from an ODOMETRY message to its POSE, and to take in a fix.
+  void NotePoseLatency(Duration latency) { pose_latency_ms_.Add(1e3 * ToSeconds(latency)); }
+  void NoteFixLatency(Duration latency) { fix_latency_ms_.Add(1e3 * ToSeconds(latency)); }
+
   /// What the next run would need; nothing while the pose is not known.
   [[nodiscard]] std::optional<SavedState> State(const std::string& boot_id) const;
 
@@ -58,12 +71,16 @@ class SmootherNode {
   struct Counters {
     std::int64_t odometry = 0;
     std::int64_t odometry_refused = 0;   ///< Old, repeated, or not usable.
+    std::int64_t clock_jumps = 0;        ///< The odometry went on at an earlier time: began anew.
     std::int64_t odometry_bridged = 0;   ///< Messages before it were lost: X_OB tells the motion.
     std::int64_t odometry_restarts = 0;  ///< odometryd began anew: the motion is a guess.
     std::int64_t camera_poses = 0;
     std::int64_t no_pose = 0;         ///< The camera says that it does not know.
     std::int64_t unknown_camera = 0;  ///< A name that the config has not.
     std::int64_t bad_pose = 0;        ///< Not finite, no unit quaternion, no covariance, tilted.
+    std::int64_t poses_set = 0;       ///< By SetPose.
+    std::int64_t poses_refused = 0;   ///< Likewise, but not usable.
+    std::int64_t resets_asked = 0;    ///< By Reset.
     std::int64_t map_changes = 0;     ///< Fixes of another map: the estimate began anew.
     std::int64_t unpublished = 0;     ///< The network refused a message.
   };
@@ -72,12 +89,14 @@ class SmootherNode {
 
  private:
   /// The motion since the last odometry message.
+  [[nodiscard]] bool IsOld(const odometry_t& message);
   [[nodiscard]] OdometryStep StepTo(const odometry_t& message);
   [[nodiscard]] OdometryStep Coast(MonotonicTime until) const;
   void Begin(const odometry_t& message);
   void DecideRestore(const odometry_t& message);
   [[nodiscard]] std::optional<Fix> ToFix(const camera_pose_t& message);
   void ChangeMap(const std::string& map_id);
+  void StartAnew();
 
   void PublishPose(const odometry_t& message, const SmootherEstimate& estimate);
   void PublishLocalization(const odometry_t& message, const SmootherEstimate& estimate);
@@ -92,6 +111,10 @@ class SmootherNode {
 
   FixedLagSmoother smoother_;
   Counters counters_;
+  std::int64_t last_old_ns_ = 0;
+  int old_in_a_row_ = 0;
+  LatencyWindow pose_latency_ms_;
+  LatencyWindow fix_latency_ms_;
   std::optional<odometry_t> last_odometry_;
   std::optional<Pose2> last_published_X_WB_;
   std::optional<Pose2> last_published_X_WO_;
