@@ -10,6 +10,7 @@
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -19,6 +20,7 @@
 
 #include "camera/jpeg.h"
 #include "camera/pinhole_camera.h"
+#include "core/sha256.h"
 #include "features/gradient_histograms.h"
 #include "map_calibration.h"
 #include "map_route.h"
@@ -119,28 +121,134 @@ class TrainingProgressLine {
   std::vector<double> done_;  ///< Of each region, in [0, 1].
 };
 
-/// What the training of a region needs besides its frames.
+/// What the training of regions needs besides their frames.
 struct RegionTraining {
   const SceneMap& map;  ///< Camera, features and whitening.
   const MapTrainingOptions& options;
   int threads = 1;
+  const TrainingFolder* folder = nullptr;  ///< If anything is kept.
 };
 
-/// The region's head. `show` is called with the share done and a few words, by one thread at a
-/// time.
-Result<MapRegion> TrainRegion(const RegionFrames& frames,
-                              const RegionTraining& training,
-                              const std::function<void(double, std::string_view)>& show) {
+/// The map with one region.
+SceneMap MapOf(const SceneMap& map, MapRegion region) {
+  SceneMap one;
+  one.camera = map.camera;
+  one.R_WD = map.R_WD;
+  one.features = map.features;
+  one.cells_per_image = map.cells_per_image;
+  one.whitening = map.whitening;
+  one.regions.push_back(std::move(region));
+  return one;
+}
+
+/// How a head does on some of its region's held-out frames.
+LiveAccuracy MeasureLive(const SceneMap& map, const Head& head, const RegionFrames& frames) {
+  constexpr std::size_t kFrames = 6;
+  std::vector<DatasetFrame> sample;
+  const std::size_t count = std::min(kFrames, frames.held_out.size());
+  for (std::size_t i = 0; i < count; ++i)
+    sample.push_back(frames.held_out[i * frames.held_out.size() / count].frame);
+  MapRegion region;
+  region.name = "live";
+  region.head = head;
+  const SceneMap one = MapOf(map, std::move(region));
+  const auto localizations = LocalizeFrames(one, sample, 1);
+  if (!localizations) return {};  // the whole measurement at the end says why
+  const PoseErrors errors = MeasureErrors(one, *localizations);
+  return {.frames = errors.frames, .localized = errors.localized, .median_m = errors.median_m};
+}
+
+/// Follows the training of one head: says how far it is and how good, and keeps its state.
+class RegionObserver {
+ public:
+  using Show = std::function<void(double, std::string_view)>;
+
+  /// Borrows all.
+  RegionObserver(std::size_t region,
+                 const RegionFrames& frames,
+                 const RegionTraining& training,
+                 const Show& show)
+      : region_(region), frames_(frames), training_(training), show_(show) {}
+
+  void Prepared(double done) const { show_(kPreparationShare * done, "features and depths"); }
+
+  void Progress(const TrainingProgress& progress) const {
+    show_(kPreparationShare + (1.0 - kPreparationShare) * static_cast<double>(progress.iteration) /
+                                  progress.iterations,
+          fmt::format("loss {:.2f}, error {:.1f} px, valid {:.0f} %{}",
+                      progress.loss,
+                      progress.median_error_px,
+                      100.0 * progress.valid,
+                      live_text_));
+  }
+
+  /// Every StateEvery() iterations.
+  void State(const TrainerState& state, const Head& head) {
+    const int done = state.iteration * kLooks / training_.options.head.iterations;
+    if (done > looks_ && !frames_.held_out.empty()) {
+      looks_ = done;
+      LiveAccuracy accuracy = MeasureLive(training_.map, head, frames_);
+      accuracy.region = region_;
+      accuracy.iteration = state.iteration;
+      live_text_ = fmt::format(
+          ", held out {:.2f} m, {} of {}", accuracy.median_m, accuracy.localized, accuracy.frames);
+      live_.push_back(accuracy);
+    }
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::duration<double> since = now - kept_;
+    if (training_.folder == nullptr || since.count() < training_.options.checkpoint_every_s) return;
+    kept_ = now;
+    // A full disk costs the state, not the training.
+    (void)training_.folder->KeepState(region_, state).has_value();
+  }
+
+  [[nodiscard]] static int StateEvery(int iterations) {
+    constexpr int kStates = 40;
+    return std::max(1, iterations / kStates);
+  }
+
+  [[nodiscard]] std::vector<LiveAccuracy> TakeLive() { return std::move(live_); }
+
+ private:
+  static constexpr int kLooks = 5;
+
+  std::size_t region_;
+  const RegionFrames& frames_;
+  const RegionTraining& training_;
+  const Show& show_;
+  int looks_ = 0;
+  std::string live_text_;
+  std::vector<LiveAccuracy> live_;
+  std::chrono::steady_clock::time_point kept_ = std::chrono::steady_clock::now();
+};
+
+/// A region's head in the making, or taken up from an earlier run.
+struct TrainedRegion {
+  MapRegion region;
+  std::vector<LiveAccuracy> live;
+};
+
+Result<TrainedRegion> TrainRegion(std::size_t index,
+                                  const RegionFrames& frames,
+                                  const RegionTraining& training,
+                                  const RegionObserver::Show& show) {
+  if (training.folder != nullptr) {
+    if (auto finished = training.folder->FinishedRegion(index)) {
+      show(1.0, "finished before");
+      return TrainedRegion{std::move(*finished), {}};
+    }
+  }
   const SceneMap& map = training.map;
   const auto images =
       LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
   if (!images) return images.error();
+  RegionObserver observer(index, frames, training, show);
   TrainingSetConfig cells = training.options.cells;
   cells.seed = training.options.seed;
   cells.threads = training.threads;
   const auto set = PrepareTraining(
       *images, PinholeCamera(map.camera), map.features, map.whitening, cells, [&](double done) {
-        show(kPreparationShare * done, "features and depths");
+        observer.Prepared(done);
       });
   if (!set) return set.error();
 
@@ -148,40 +256,48 @@ Result<MapRegion> TrainRegion(const RegionFrames& frames,
   config.seed = training.options.seed;
   config.threads = training.threads;
   config.shape.inputs = set->dimension;
-  auto head = TrainHead(*set, config, [&](const TrainingProgress& progress) {
-    show(kPreparationShare + (1.0 - kPreparationShare) * static_cast<double>(progress.iteration) /
-                                 progress.iterations,
-         fmt::format("loss {:.2f}, error {:.1f} px, valid {:.0f} %",
-                     progress.loss,
-                     progress.median_error_px,
-                     100.0 * progress.valid));
-  });
+  const auto state = training.folder == nullptr ? std::nullopt : training.folder->State(index);
+  auto head = TrainHead(
+      *set,
+      config,
+      {.progress = [&](const TrainingProgress& progress) { observer.Progress(progress); },
+       .state = [&](const TrainerState& now, const Head& so_far) { observer.State(now, so_far); },
+       .state_every = RegionObserver::StateEvery(config.iterations),
+       .resume = state ? &*state : nullptr});
   if (!head) return std::move(head).error();
   for (HeadLayer& layer : head->layers) {
     RoundAsStored(layer.weights);
     RoundAsStored(layer.bias);
   }
   MapRegion region;
+  region.name = fmt::format("region{}", index);
   region.head = std::move(*head);
   region.training_poses = CoarsePoses(*images);
-  return region;
+  if (training.folder != nullptr) {
+    // As above: what cannot be kept is made again.
+    (void)training.folder->KeepRegion(index, MapOf(map, region)).has_value();
+  }
+  return TrainedRegion{std::move(region), observer.TakeLive()};
 }
 
 /// Trains the heads side by side, each on a thread of its own: threads that share one head wait for
 /// each other at every step. With fewer regions than threads, a head has several.
 Result<void> TrainRegions(const std::vector<RegionFrames>& regions,
                           const MapTrainingOptions& options,
-                          SceneMap& map) {
+                          TrainedMap& result) {
   const std::size_t workers = std::min<std::size_t>(options.threads, regions.size());
-  const RegionTraining training{map, options, options.threads / static_cast<int>(workers)};
+  const RegionTraining training{result.map,
+                                options,
+                                options.threads / static_cast<int>(workers),
+                                result.folder ? &*result.folder : nullptr};
   TrainingProgressLine line(regions.size());
-  std::vector<std::optional<Result<MapRegion>>> trained(regions.size());
+  std::vector<std::optional<Result<TrainedRegion>>> trained(regions.size());
   std::atomic<std::size_t> next = 0;
   std::atomic<bool> has_failed = false;
   const auto work = [&] {
     for (std::size_t index = next++; index < regions.size() && !has_failed; index = next++) {
       trained[index] =
-          TrainRegion(regions[index], training, [&](double done, std::string_view detail) {
+          TrainRegion(index, regions[index], training, [&](double done, std::string_view detail) {
             line.Show(index, done, detail);
           });
       if (!*trained[index]) has_failed = true;
@@ -197,9 +313,10 @@ Result<void> TrainRegions(const std::vector<RegionFrames>& regions,
   for (const auto& region : trained) {
     if (region && !*region) return region->error();
   }
-  for (std::size_t index = 0; index < regions.size(); ++index) {
-    map.regions.push_back(std::move(**trained[index]));
-    map.regions.back().name = fmt::format("region{}", index);
+  for (auto& region : trained) {
+    result.map.regions.push_back(std::move((*region)->region));
+    const std::vector<LiveAccuracy>& live = (*region)->live;
+    result.live.insert(result.live.end(), live.begin(), live.end());
   }
   return {};
 }
@@ -230,6 +347,64 @@ Result<FeatureWhitening> FitRouteWhitening(const std::vector<RouteFrame>& route,
   return whitening;
 }
 
+/// Of all options that the map's bytes depend on.
+std::string FingerprintOf(const MapTrainingOptions& options) {
+  const TrainingSetConfig& cells = options.cells;
+  const HeadTrainerConfig& head = options.head;
+  const Precision precision =
+      head.precision == Precision::kFastest ? FastestPrecision() : head.precision;
+  return fmt::format("{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+                     RELOCD_VERSION,
+                     options.seed,
+                     options.region_length_m,
+                     options.region_overlap_m,
+                     options.held_out_every,
+                     options.whitened_dimensions,
+                     cells.cells_per_view,
+                     cells.views_per_image,
+                     cells.max_scale,
+                     cells.max_roll_rad,
+                     cells.max_blur_px,
+                     cells.measure_depth,
+                     head.shape.width,
+                     head.shape.blocks,
+                     head.iterations,
+                     head.batch,
+                     head.learning_rate,
+                     head.initial_tolerance_px,
+                     head.final_tolerance_px,
+                     precision == Precision::kBfloat16 ? "bfloat16" : "float");
+}
+
+/// Opens the folder beside the map, and says on stderr what is taken up.
+Result<void> OpenFolder(const std::vector<SelectedFrames>& drives,
+                        const MapTrainingOptions& options,
+                        std::size_t regions,
+                        TrainedMap& result) {
+  if (options.resumable_path.empty()) return {};
+  const std::string fingerprint = Sha256Hex(FingerprintOf(options) + FingerprintOf(drives));
+  auto folder = TrainingFolder::Open(options.resumable_path, fingerprint);
+  if (!folder) return std::move(folder).error();
+  result.folder = std::move(*folder);
+  std::size_t finished = 0;
+  std::size_t begun = 0;
+  for (std::size_t region = 0; region < regions; ++region) {
+    if (result.folder->FinishedRegion(region)) {
+      ++finished;
+    } else if (result.folder->State(region)) {
+      ++begun;
+    }
+  }
+  if (finished + begun == 0) return {};
+  fmt::print(stderr,
+             "{}: goes on from an earlier run: {} of {} regions finished, {} begun\n",
+             result.folder->path(),
+             finished,
+             regions,
+             begun);
+  return {};
+}
+
 }  // namespace
 
 Result<void> MapTrainingOptions::Validate() const {
@@ -242,6 +417,9 @@ Result<void> MapTrainingOptions::Validate() const {
   if (!(region_length_m >= 10.0)) return must("--region-length", region_length_m, "at least 10 m");
   if (whitened_dimensions < 1) {
     return must("whitened dimensions", whitened_dimensions, "at least 1");
+  }
+  if (!(checkpoint_every_s >= 0.0)) {
+    return must("--checkpoint-every", checkpoint_every_s, "at least 0 s");
   }
   if (cells.views_per_image < 1) return must("--views", cells.views_per_image, "at least 1");
   return {};
@@ -270,7 +448,10 @@ Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
   map.whitening = std::move(*whitening);
   const std::vector<RegionFrames> regions =
       DivideRoute(*route, options.region_length_m, options.region_overlap_m);
-  if (auto done = TrainRegions(regions, options, map); !done) return std::move(done).error();
+  if (auto opened = OpenFolder(drives, options, regions.size(), trained); !opened) {
+    return std::move(opened).error();
+  }
+  if (auto done = TrainRegions(regions, options, trained); !done) return std::move(done).error();
   for (const RegionFrames& frames : regions) {
     map.training.training_frames += static_cast<std::uint32_t>(frames.training.size());
   }
@@ -285,6 +466,7 @@ Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
   auto localizations = LocalizeFrames(map, held_out, options.threads);
   if (!localizations) return std::move(localizations).error();
   trained.localizations = std::move(*localizations);
+  trained.route = *route;
   trained.held_out = MeasureErrors(map, trained.localizations);
 
   for (const SelectedFrames& drive : drives)

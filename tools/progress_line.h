@@ -24,6 +24,7 @@ class ProgressLine {
   std::string label_;
   bool is_terminal_;
   bool has_shown_ = false;
+  double done_before_ = -1.0;  ///< At the first call: what goes on was begun earlier.
   std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_;
 };

@@ -1,16 +1,23 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "camera/pinhole_camera.h"
 #include "core/exit_code.h"
 #include "core/file.h"
 #include "map_calibration.h"
@@ -18,6 +25,7 @@
 #include "map_disturbance.h"
 #include "map_evaluation.h"
 #include "map_input.h"
+#include "map_report.h"
 #include "map_route.h"
 #include "map_training.h"
 #include "scene_coordinates/map_file.h"
@@ -29,12 +37,28 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
+/// The tangent of a pose in the order of its covariance: metres and radians about the camera's
+/// axes.
+constexpr std::array<std::string_view, 6> kTangent = {"x", "y", "z", "rx", "ry", "rz"};
+
+std::vector<std::pair<std::size_t, std::size_t>> UpperTriangle() {
+  std::vector<std::pair<std::size_t, std::size_t>> entries;
+  for (std::size_t row = 0; row < kTangent.size(); ++row) {
+    for (std::size_t column = row; column < kTangent.size(); ++column)
+      entries.emplace_back(row, column);
+  }
+  return entries;
+}
+
 /// `poses.csv` in the data set's coordinates.
 std::string FormatPoses(const SceneMap& map, const std::vector<FrameLocalization>& localizations) {
   const Pose3 X_DW = Pose3(map.R_WD, Eigen::Vector3d::Zero()).Inverse();
   std::string text =
       "index,time_s,status,tx_m,ty_m,tz_m,qw,qx,qy,qz,inliers,confidence,sigma_t_m,sigma_r_rad,"
-      "region\n";
+      "region";
+  for (const auto& [row, column] : UpperTriangle())
+    text += fmt::format(",cov_{}_{}", kTangent[row], kTangent[column]);
+  text += "\n";
   auto out = std::back_inserter(text);
   for (const FrameLocalization& localization : localizations) {
     const CameraPoseResult& pose = localization.pose;
@@ -44,14 +68,18 @@ std::string FormatPoses(const SceneMap& map, const std::vector<FrameLocalization
                    1e-9 * static_cast<double>(localization.frame.time_ns),
                    Name(pose.status));
     if (pose.status != CameraPoseStatus::kOk) {
-      fmt::format_to(out, ",,,,,,,,{},{:.4f},,,\n", pose.inliers, pose.confidence);
+      fmt::format_to(out,
+                     ",,,,,,,,{},{:.4f},,,{}\n",
+                     pose.inliers,
+                     pose.confidence,
+                     std::string(UpperTriangle().size(), ','));
       continue;
     }
     const Pose3 X_DC = X_DW * pose.X_WC;
     const Eigen::Vector3d& t = X_DC.translation();
     const Eigen::Quaterniond& q = X_DC.rotation();
     fmt::format_to(out,
-                   ",{:.6f},{:.6f},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{},{:.4f},{:.4f},{:.6f},{}\n",
+                   ",{:.6f},{:.6f},{:.6f},{:.9f},{:.9f},{:.9f},{:.9f},{},{:.4f},{:.4f},{:.6f},{}",
                    t.x(),
                    t.y(),
                    t.z(),
@@ -64,8 +92,58 @@ std::string FormatPoses(const SceneMap& map, const std::vector<FrameLocalization
                    std::sqrt(pose.covariance.topLeftCorner<3, 3>().trace()),
                    std::sqrt(pose.covariance.bottomRightCorner<3, 3>().trace()),
                    map.regions[localization.region].name);
+    for (const auto& [row, column] : UpperTriangle()) {
+      const auto i = static_cast<Eigen::Index>(row);
+      fmt::format_to(out, ",{:.9g}", pose.covariance(i, static_cast<Eigen::Index>(column)));
+    }
+    text += "\n";
   }
   return text;
+}
+
+/// Whether two cameras see the same: how far apart the pixels of one ray are, at most, over the
+/// image.
+double MostApartPx(const CameraIntrinsics& a, const CameraIntrinsics& b) {
+  constexpr int kSteps = 8;
+  const PinholeCamera camera_a(a);
+  const PinholeCamera camera_b(b);
+  double most_px = 0.0;
+  for (int i = 0; i <= kSteps * kSteps; ++i) {
+    const Eigen::Vector2d pixel(a.width * (i % kSteps) / static_cast<double>(kSteps - 1),
+                                a.height * (i / kSteps) / static_cast<double>(kSteps));
+    const auto ray = camera_a.Unproject(pixel);
+    if (!ray) continue;
+    const auto seen = camera_b.Project(ray->homogeneous());
+    if (!seen) return std::numeric_limits<double>::infinity();
+    most_px = std::max(most_px, (*seen - pixel).norm());
+  }
+  return most_px;
+}
+
+std::string DescribeCamera(const CameraIntrinsics& camera) {
+  return fmt::format("{} x {} px with f {:.1f} {:.1f}, centre {:.1f} {:.1f}, distortion {:.4g}",
+                     camera.width,
+                     camera.height,
+                     camera.fx,
+                     camera.fy,
+                     camera.cx,
+                     camera.cy,
+                     fmt::join(camera.distortion, " "));
+}
+
+/// @return kInvalidInput when the map was made with another camera than the data set.
+Result<void> CheckCamera(const SceneMap& map, const std::string& name, const Dataset& dataset) {
+  constexpr double kMaxApart = 0.02;  // of the width; calibrations of one camera differ by less
+  const CameraIntrinsics& camera = dataset.intrinsics;
+  const bool same_size = map.camera.width == camera.width && map.camera.height == camera.height;
+  if (same_size && MostApartPx(map.camera, camera) <= kMaxApart * camera.width) return {};
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("{} is a map for another camera ({}) than that of {} ({}): train a map "
+                           "with images of this camera",
+                           name,
+                           DescribeCamera(map.camera),
+                           dataset.directory,
+                           DescribeCamera(camera))};
 }
 
 std::string FormatErrors(const PoseErrors& errors) {
@@ -84,26 +162,6 @@ std::string FormatErrors(const PoseErrors& errors) {
       errors.sigma_rank_correlation,
       errors.median_ms,
       errors.p99_ms);
-}
-
-/// What the report folder gets, besides the poses of the held-out frames.
-std::string FormatReport(const TrainedMap& trained, const MapTrainingOptions& options) {
-  std::string text = "held-out training frames: " + FormatErrors(trained.held_out);
-  for (const MapRegion& region : trained.map.regions) {
-    text += fmt::format(
-        "{}: {} training frames, covariance factor {:.1f}, confidence threshold {:.3f}\n",
-        region.name,
-        region.training_poses.size(),
-        region.calibration.covariance_factor,
-        region.calibration.confidence_threshold);
-  }
-  text += fmt::format("{} iterations of {}, seed {}, {:.0f} s with {} threads\n",
-                      options.head.iterations,
-                      options.head.batch,
-                      options.seed,
-                      trained.seconds,
-                      options.threads);
-  return text;
 }
 
 struct TrainCommand {
@@ -155,16 +213,22 @@ Result<int> Train(const TrainCommand& command) {
   if (auto checked = CheckDrives(drives, *gate, command.options.threads); !checked) {
     return checked.error();
   }
-  auto trained = TrainMap(drives, command.options);
+  MapTrainingOptions options = command.options;
+  options.resumable_path = command.out;
+  auto trained = TrainMap(drives, options);
   if (!trained) return std::move(trained).error();
   if (auto written = WriteMap(trained->map, command.out); !written) return written.error();
-  const std::string report = FormatReport(*trained, command.options);
-  fmt::print("{}", report);
+  if (trained->folder) trained->folder->Remove();
+  const TrainingReport report = MakeTrainingReport(*trained, options);
+  fmt::print("{}", FormatTrainingReport(report));
   if (command.report.empty()) return kExitOk;
+  const auto page = FormatTrainingReportHtml(report);
+  if (!page) return page.error();
   std::error_code failed;
   std::filesystem::create_directories(command.report, failed);  // what fails shows on writing
   for (const auto& [name, text] :
-       {std::pair<std::string, std::string>{"/report.txt", report},
+       {std::pair<std::string, std::string>{"/report.txt", FormatTrainingReport(report)},
+        {"/report.html", *page},
         {"/held_out_poses.csv", FormatPoses(trained->map, trained->localizations)}}) {
     if (auto written = WriteFileAtomically(command.report + name, text); !written) {
       return written.error();
@@ -217,6 +281,9 @@ Result<int> Localize(const LocalizeCommand& command) {
   if (!map) return map.error();
   const auto selected = SelectFrames(command.frames, SplitPart::kTest);
   if (!selected) return selected.error();
+  if (!command.fits_size) {
+    if (auto same = CheckCamera(*map, command.map, selected->dataset); !same) return same.error();
+  }
   const auto change = [&](const GrayImage& image, int index) {
     const GrayImage fitted =
         command.fits_size ? FitSize(image, map->camera.width, map->camera.height) : image;
@@ -379,6 +446,11 @@ int Main(int argc, char** argv) {
                         train.input_check,
                         "what follows from a bad data set: refuse (default), warn, off");
   train_app->add_option("--iterations", train.options.head.iterations, "steps for each region");
+  train_app->add_option(
+      "--checkpoint-every",
+      train.options.checkpoint_every_s,
+      "seconds after which a region in training is kept in OUT.partial, from which "
+      "the same command goes on; default 30");
   train_app->add_option("--views", train.options.cells.views_per_image, "changed copies an image");
   train_app->add_option("--held-out-every", train.options.held_out_every, "default 8");
   train_app->add_option("--region-length", train.options.region_length_m, "default 150 m");

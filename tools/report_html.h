@@ -1,9 +1,9 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "base64.h"
 #include "report_frames.h"
 #include "report_numbers.h"
 
@@ -21,8 +21,5 @@ std::string FormatReportHtml(const DriveReport& report,
                              const ReportFigure& drive,
                              const ReportFigure& errors,
                              const std::vector<ReportFrame>& frames);
-
-/// RFC 4648, with padding.
-std::string EncodeBase64(std::string_view bytes);
 
 }  // namespace relocd

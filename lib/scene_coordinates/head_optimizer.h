@@ -42,6 +42,15 @@ class HeadOptimizer {
                    std::span<const float> gradient,
                    std::span<float> parameters);
 
+  /// All that it remembers between steps, one value a parameter.
+  [[nodiscard]] const std::vector<float>& momentum() const { return momentum_; }
+  [[nodiscard]] const std::vector<float>& variance() const { return variance_; }
+  /// Goes on as one that remembered this. Both must be of the layout's size.
+  void Restore(const std::vector<float>& momentum, const std::vector<float>& variance) {
+    momentum_ = momentum;
+    variance_ = variance;
+  }
+
  private:
   class Orthogonaliser;
 

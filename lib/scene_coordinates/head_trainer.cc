@@ -130,8 +130,10 @@ class Trainer {
   Trainer(const TrainingSet& set,
           const HeadTrainerConfig& config,
           Precision precision,
-          const std::function<void(const TrainingProgress&)>& progress);
+          const TrainerHooks& hooks);
 
+  /// Continues from there instead of from the beginning.
+  Result<void> Resume(const TrainerState& state);
   Head Run();
 
  private:
@@ -141,11 +143,13 @@ class Trainer {
   /// By one thread, between the steps of all.
   void Advance();
   void Report();
+  void ShowState();
+  void TakeBatch();
   void BeginStep();
 
   const TrainingSet& set_;
   const HeadTrainerConfig& config_;
-  const std::function<void(const TrainingProgress&)>& progress_;
+  const TrainerHooks& hooks_;
   std::mt19937_64 engine_;
   Head head_;
   ParameterLayout layout_;
@@ -180,10 +184,10 @@ template <typename Number>
 Trainer<Number>::Trainer(const TrainingSet& set,
                          const HeadTrainerConfig& config,
                          Precision precision,
-                         const std::function<void(const TrainingProgress&)>& progress)
+                         const TrainerHooks& hooks)
     : set_(set),
       config_(config),
-      progress_(progress),
+      hooks_(hooks),
       engine_(config.seed),
       head_(MakeRandomHead(config.shape, engine_())),
       layout_(config.shape),
@@ -208,6 +212,31 @@ Trainer<Number>::Trainer(const TrainingSet& set,
   }
   std::iota(order_.begin(), order_.end(), 0U);
   next_in_order_ = order_.size();
+}
+
+template <typename Number>
+Result<void> Trainer<Number>::Resume(const TrainerState& state) {
+  const auto fits = [&](const std::vector<float>& values) {
+    return values.size() == layout_.size();
+  };
+  if (state.iteration < 1 || state.iteration >= config_.iterations || !fits(state.parameters) ||
+      !fits(state.momentum) || !fits(state.variance)) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("the state to go on from is at iteration {} of {} with {} parameters, "
+                             "must be before the end and have {}",
+                             state.iteration,
+                             config_.iterations,
+                             state.parameters.size(),
+                             layout_.size())};
+  }
+  parameters_ = state.parameters;
+  optimizer_.Restore(state.momentum, state.variance);
+  Narrow(parameters_.data(), parameters_.size(), narrow_parameters_.data());
+  for (; iteration_ < state.iteration; ++iteration_) {  // draw the same order of cells
+    TakeBatch();
+    next_in_order_ += static_cast<std::size_t>(config_.batch);
+  }
+  return {};
 }
 
 template <typename Number>
@@ -277,7 +306,16 @@ void Trainer<Number>::Advance() {
     loss_since_report_ += loss->loss();
   }
   if (iteration_ % kReportEvery == 0 || iteration_ == config_.iterations) Report();
-  if (iteration_ < config_.iterations) BeginStep();
+  if (iteration_ == config_.iterations) return;
+  if (hooks_.state && hooks_.state_every > 0 && iteration_ % hooks_.state_every == 0) ShowState();
+  BeginStep();
+}
+
+template <typename Number>
+void Trainer<Number>::ShowState() {
+  Head head = head_;
+  UnflattenHead(layout_, parameters_, head);
+  hooks_.state({iteration_, parameters_, optimizer_.momentum(), optimizer_.variance()}, head);
 }
 
 template <typename Number>
@@ -298,15 +336,21 @@ void Trainer<Number>::Report() {
     report.median_error_px = *middle;
   }
   loss_since_report_ = 0.0;
-  if (progress_) progress_(report);
+  if (hooks_.progress) hooks_.progress(report);
 }
 
+/// Shuffles the cells anew when too few are left of the last time.
 template <typename Number>
-void Trainer<Number>::BeginStep() {
+void Trainer<Number>::TakeBatch() {
   if (next_in_order_ + static_cast<std::size_t>(config_.batch) > order_.size()) {
     std::shuffle(order_.begin(), order_.end(), engine_);
     next_in_order_ = 0;
   }
+}
+
+template <typename Number>
+void Trainer<Number>::BeginStep() {
+  TakeBatch();
   const double share = RateShare(config_, iteration_);
   step_ = {.iteration = iteration_,
            .matrix_rate = share * config_.matrix_learning_rate,
@@ -337,6 +381,18 @@ Result<void> CheckSet(const TrainingSet& set, const HeadTrainerConfig& config) {
                              config.batch)};
   }
   return {};
+}
+
+template <typename Number>
+Result<Head> RunTrainer(const TrainingSet& set,
+                        const HeadTrainerConfig& config,
+                        Precision precision,
+                        const TrainerHooks& hooks) {
+  Trainer<Number> trainer(set, config, precision, hooks);
+  if (hooks.resume != nullptr) {
+    if (auto resumed = trainer.Resume(*hooks.resume); !resumed) return std::move(resumed).error();
+  }
+  return trainer.Run();
 }
 
 }  // namespace
@@ -372,17 +428,16 @@ Result<void> HeadTrainerConfig::Validate() const {
 
 Result<Head> TrainHead(const TrainingSet& set,
                        const HeadTrainerConfig& config,
-                       const std::function<void(const TrainingProgress&)>& progress) {
+                       const TrainerHooks& hooks) {
   if (auto valid = config.Validate(); !valid) return std::move(valid).error();
   if (auto valid = CheckSet(set, config); !valid) return std::move(valid).error();
   const Precision precision =
       config.precision == Precision::kFastest ? FastestPrecision() : config.precision;
   try {
     omp_set_num_threads(1);  // products are made for one thread each
-    if (precision == Precision::kBfloat16) {
-      return Trainer<Bfloat16>(set, config, precision, progress).Run();
-    }
-    return Trainer<float>(set, config, precision, progress).Run();
+    if (precision == Precision::kBfloat16)
+      return RunTrainer<Bfloat16>(set, config, precision, hooks);
+    return RunTrainer<float>(set, config, precision, hooks);
   } catch (const dnnl::error& error) {
     return Error{ErrorKind::kInternal, fmt::format("training a head: {}", error.what())};
   }

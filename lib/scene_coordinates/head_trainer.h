@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "core/result.h"
 #include "scene_coordinates/head.h"
@@ -45,6 +46,24 @@ struct TrainingProgress {
   double valid = 0.0;            ///< Share of points in front of the camera and roughly right.
 };
 
+/// Where a training stands. With it, the same set and the same configuration, training goes on to
+/// the same bits as without a break.
+struct TrainerState {
+  int iteration = 0;              ///< Steps done.
+  std::vector<float> parameters;  ///< Of all layers, as the next two, which are the optimizer's.
+  std::vector<float> momentum;
+  std::vector<float> variance;
+};
+
+/// What happens while a head is trained. All are called by one thread, while the others wait.
+struct TrainerHooks {
+  std::function<void(const TrainingProgress&)> progress = {};
+  /// Gets the state, and the head as it is then, every `state_every` iterations; 0 is never.
+  std::function<void(const TrainerState&, const Head&)> state = {};
+  int state_every = 0;
+  const TrainerState* resume = nullptr;  ///< Begin there. Borrowed during the call.
+};
+
 /// Trains a head to give for each cell the point that it looks at.
 ///
 /// Follows the published idea of scene-coordinate regression on a shuffled buffer of frozen
@@ -54,9 +73,9 @@ struct TrainingProgress {
 /// known or typical depth. Where a depth was measured, its error counts too, as disparity.
 ///
 /// The network and its derivatives are written out here; oneDNN multiplies the matrices.
-/// @return kInvalidInput for a bad configuration or an empty set.
+/// @return kInvalidInput for a bad configuration, an empty set, or a state of another training.
 Result<Head> TrainHead(const TrainingSet& set,
                        const HeadTrainerConfig& config,
-                       const std::function<void(const TrainingProgress&)>& progress);
+                       const TrainerHooks& hooks);
 
 }  // namespace relocd

@@ -81,9 +81,10 @@ class HeadTrainerSceneTest : public testing::TestWithParam<bool> {};
 TEST_P(HeadTrainerSceneTest, FindsThePointsOfASmallScene) {
   const PointScene scene(GetParam());
   std::vector<double> losses;
-  const auto head = TrainHead(scene.set, TestConfig(), [&](const TrainingProgress& progress) {
-    losses.push_back(progress.loss);
-  });
+  const auto head =
+      TrainHead(scene.set, TestConfig(), {.progress = [&](const TrainingProgress& progress) {
+                  losses.push_back(progress.loss);
+                }});
   ASSERT_TRUE(head) << head.error().message;
   EXPECT_EQ(losses.size(), 16U);
   EXPECT_LT(losses.back(), 0.1 * losses.front());
@@ -114,6 +115,52 @@ TEST(HeadTrainerTest, TheSeedDecidesTheResultToTheBit) {
 TEST(HeadTrainerTest, TheNumberOfThreadsDoesNotChangeTheResult) {
   EXPECT_EQ(WeightsAfter(5, 1, Precision::kFloat32), WeightsAfter(5, 2, Precision::kFloat32));
   EXPECT_EQ(WeightsAfter(5, 1, Precision::kFastest), WeightsAfter(5, 3, Precision::kFastest));
+}
+
+TEST(HeadTrainerTest, GoesOnFromAStateToTheSameBits) {
+  const PointScene scene(true);
+  HeadTrainerConfig config = TestConfig();
+  config.iterations = 40;
+  config.precision = Precision::kFastest;
+  std::vector<TrainerState> states;
+  const auto whole =
+      TrainHead(scene.set,
+                config,
+                {.state = [&](const TrainerState& state, const Head&) { states.push_back(state); },
+                 .state_every = 13});
+  ASSERT_TRUE(whole);
+  ASSERT_EQ(states.size(), 3U);
+  for (const TrainerState& state : states) {
+    const auto resumed = TrainHead(scene.set, config, {.resume = &state});
+    ASSERT_TRUE(resumed) << resumed.error().message;
+    for (std::size_t layer = 0; layer < whole->layers.size(); ++layer) {
+      EXPECT_EQ(resumed->layers[layer].weights, whole->layers[layer].weights) << state.iteration;
+      EXPECT_EQ(resumed->layers[layer].bias, whole->layers[layer].bias) << state.iteration;
+    }
+  }
+}
+
+TEST(HeadTrainerTest, ShowsTheHeadAsItIs) {
+  const PointScene scene(true);
+  std::vector<double> errors;
+  const auto head =
+      TrainHead(scene.set,
+                TestConfig(),
+                {.state = [&](const TrainerState&,
+                              const Head& now) { errors.push_back(scene.MedianError(now)); },
+                 .state_every = 200});
+  ASSERT_TRUE(head);
+  ASSERT_EQ(errors.size(), 3U);
+  EXPECT_LT(errors.back(), 0.5 * errors.front());
+}
+
+TEST(HeadTrainerTest, RefusesAStateOfAnotherTraining) {
+  const PointScene scene(true);
+  TrainerState state{.iteration = 900, .parameters = {1.0F}, .momentum = {}, .variance = {}};
+  const auto head = TrainHead(scene.set, TestConfig(), {.resume = &state});
+  ASSERT_FALSE(head);
+  EXPECT_THAT(head.error().message,
+              testing::HasSubstr("is at iteration 900 of 800 with 1 parameters, must be before"));
 }
 
 TEST(HeadTrainerTest, RefusesASetThatIsSmallerThanABatch) {

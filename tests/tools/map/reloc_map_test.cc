@@ -1,5 +1,9 @@
 #include <poll.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
+#include <array>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -55,6 +59,33 @@ class RelocMapTest : public testing::Test {
     return fmt::format("{}/{}", folder_.path(), name);
   }
 
+  /// Starts the program, and kills it as soon as the file is there in the folder.
+  void RunUntil(const std::string& arguments, const std::string& folder, std::string_view file) {
+    std::filesystem::create_directories(Path(folder));
+    const int watch = ::inotify_init1(IN_CLOEXEC);
+    ASSERT_GE(::inotify_add_watch(watch, Path(folder).c_str(), IN_MOVED_TO), 0);
+    const std::string command = fmt::format(
+        "cd {} && exec {} {} >output.txt 2>&1", folder_.path(), RELOC_MAP_PROGRAM, arguments);
+    auto process = ChildProcess::Start({.command = {"/bin/sh", "-c", command}});
+    ASSERT_TRUE(process);
+    std::string seen;
+    while (seen.find(file) == std::string::npos) {
+      std::array<pollfd, 2> waited = {pollfd{.fd = watch, .events = POLLIN, .revents = 0},
+                                      pollfd{.fd = process->fd(), .events = POLLIN, .revents = 0}};
+      ASSERT_GT(::poll(waited.data(), waited.size(), 200'000), 0);
+      ASSERT_EQ(waited[1].revents, 0) << "it ended before " << file << " came";
+      std::array<char, 4096> events{};
+      const ssize_t size = ::read(watch, events.data(), events.size());
+      ASSERT_GT(size, 0);
+      seen.append(events.data(), static_cast<std::size_t>(size));
+    }
+    process->KillGroup();
+    pollfd ended{.fd = process->fd(), .events = POLLIN, .revents = 0};
+    ASSERT_EQ(::poll(&ended, 1, 10'000), 1);
+    (void)process->Reap();
+    ::close(watch);
+  }
+
   [[nodiscard]] Outcome Run(const std::string& arguments) const {
     const std::string command = fmt::format(
         "cd {} && exec {} {} >output.txt 2>&1", folder_.path(), RELOC_MAP_PROGRAM, arguments);
@@ -83,6 +114,8 @@ TEST_F(RelocMapTest, TrainsAMapThatLocalizeAndInfoRead) {
   ASSERT_TRUE(poses) << poses.error().message;
   ASSERT_EQ(poses->row_count(), 5U);
   EXPECT_EQ(poses->Int64(0, 0).value(), 3);
+  EXPECT_THAT(ReadFile(Path("poses.csv")).value(),
+              HasSubstr(",region,cov_x_x,cov_x_y,cov_x_z,cov_x_rx,cov_x_ry,cov_x_rz,cov_y_y,"));
 
   const Outcome info = Run("info a.relocmap --json");
   EXPECT_EQ(info.exit_code, kExitOk);
@@ -111,6 +144,56 @@ TEST_F(RelocMapTest, CalibratedOnTheSameFramesAMapStaysAsItIs) {
   ASSERT_EQ(again.exit_code, kExitOk) << again.output;
   EXPECT_THAT(again.output, HasSubstr("of 1 frames"));
   EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("b.relocmap")).value());
+}
+
+TEST_F(RelocMapTest, GoesOnAfterAKillWithinARegionToTheSameBytes) {
+  const std::string train =
+      "train --dataset . --iterations 12 --views 1 --threads 1 --checkpoint-every 0 --out ";
+  ASSERT_EQ(Run(train + "whole.relocmap").exit_code, kExitOk);
+  EXPECT_FALSE(std::filesystem::exists(Path("whole.relocmap.partial")));
+
+  RunUntil(train + "a.relocmap", "a.relocmap.partial", "region0.state");
+  EXPECT_FALSE(std::filesystem::exists(Path("a.relocmap")));
+  const Outcome resumed = Run(train + "a.relocmap");
+  ASSERT_EQ(resumed.exit_code, kExitOk) << resumed.output;
+  EXPECT_THAT(resumed.output,
+              HasSubstr("a.relocmap.partial: goes on from an earlier run: 0 of 1 regions finished, "
+                        "1 begun"));
+  EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("whole.relocmap")).value());
+  EXPECT_FALSE(std::filesystem::exists(Path("a.relocmap.partial")));
+}
+
+TEST_F(RelocMapTest, TakesFinishedRegionsUpButNotThoseOfOtherOptions) {
+  WriteDrive(20.0);
+  const std::string train =
+      "train --dataset . --input-check off --iterations 2 --views 2 --region-length 10 --threads "
+      "1 ";
+  ASSERT_EQ(Run(train + "--out whole.relocmap").exit_code, kExitOk);
+  RunUntil(train + "--out a.relocmap", "a.relocmap.partial", "region1.relocmap");
+  std::filesystem::copy(Path("a.relocmap.partial"), Path("b.relocmap.partial"));
+  const Outcome resumed = Run(train + "--out a.relocmap");
+  ASSERT_EQ(resumed.exit_code, kExitOk) << resumed.output;
+  EXPECT_THAT(resumed.output, HasSubstr("regions finished"));
+  EXPECT_EQ(ReadFile(Path("a.relocmap")).value(), ReadFile(Path("whole.relocmap")).value());
+
+  const Outcome other = Run(train + "--seed 2 --out b.relocmap");
+  ASSERT_EQ(other.exit_code, kExitOk) << other.output;
+  EXPECT_THAT(other.output, testing::Not(HasSubstr("goes on")));
+  EXPECT_NE(ReadFile(Path("b.relocmap")).value(), ReadFile(Path("whole.relocmap")).value());
+}
+
+TEST_F(RelocMapTest, RefusesAMapForAnotherCamera) {
+  const std::string train = "train --dataset . --iterations 2 --views 1 --out a.relocmap";
+  ASSERT_EQ(Run(train).exit_code, kExitOk);
+  folder_.Write("intrinsics.txt", "250 250 119.5 79.5 240 160\n");
+  const Outcome outcome = Run("localize --map a.relocmap --dataset . --out poses.csv");
+  EXPECT_EQ(outcome.exit_code, kExitConfig);
+  EXPECT_THAT(outcome.output,
+              AllOf(HasSubstr("a.relocmap is a map for another camera (240 x 160 px with f 220.0"),
+                    HasSubstr("than that of . (240 x 160 px with f 250.0"),
+                    HasSubstr("train a map with images of this camera")));
+  folder_.Write("intrinsics.txt", "221 221 119.5 79.5 240 160\n");  // calibrated once more
+  EXPECT_EQ(Run("localize --map a.relocmap --dataset . --out poses.csv").exit_code, kExitOk);
 }
 
 TEST_F(RelocMapTest, RefusesAMapThatIsMissingOrNone) {
