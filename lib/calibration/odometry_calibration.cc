@@ -307,50 +307,57 @@ void CalibrateSensors(const OdometryRecording& recording,
   }
 }
 
-/// The front wheels' scales: how far each should have rolled by the calibrated rear axle, in the
-/// median over seconds.
-void CalibrateFront(const OdometryRecording& recording, OdometryCalibration& calibration) {
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// How far a front wheel should have rolled by the calibrated rear axle, over what it measured, for
+/// each second.
+std::vector<double> FrontRatios(const OdometryRecording& recording,
+                                const DriveParameters& drive,
+                                std::size_t wheel) {
   constexpr double kBlockS = 1.0;
   constexpr double kLeastM = 0.5;
-  const DriveParameters& drive = calibration.drive;
   const auto& samples = recording.samples;
+  const double y_m = (wheel == 2 ? 0.5 : -0.5) * drive.track_m;
+  std::vector<double> ratios;
+  double expected_m = 0.0;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double left_m = drive.left_scale * (samples[i].travel_m[0] - samples[i - 1].travel_m[0]);
+    const double right_m =
+        drive.right_scale * (samples[i].travel_m[1] - samples[i - 1].travel_m[1]);
+    const double turn_rad = (right_m - left_m) / drive.track_m;
+    const double along_m = 0.5 * (left_m + right_m) - y_m * turn_rad;
+    expected_m += std::copysign(std::hypot(along_m, drive.wheelbase_m * turn_rad), along_m);
+    if (samples[i].time_s < samples[begin].time_s + kBlockS) continue;
+    const double measured_m = samples[i].travel_m.at(wheel) - samples[begin].travel_m.at(wheel);
+    if (std::abs(measured_m) > kLeastM) ratios.push_back(expected_m / measured_m);
+    expected_m = 0.0;
+    begin = i;
+  }
+  return ratios;
+}
+
+/// The front wheels' scales, by the median over seconds.
+void CalibrateFront(const OdometryRecording& recording, OdometryCalibration& calibration) {
+  constexpr std::size_t kLeastRatios = 5;
   for (std::size_t wheel = 2; wheel < OdometryRecording::kWheels; ++wheel) {
-    const double y_m = (wheel == 2 ? 0.5 : -0.5) * drive.track_m;
-    std::vector<double> ratios;
-    double expected_m = 0.0;
-    std::size_t begin = 0;
-    for (std::size_t i = 1; i < samples.size(); ++i) {
-      const double left_m =
-          drive.left_scale * (samples[i].travel_m[0] - samples[i - 1].travel_m[0]);
-      const double right_m =
-          drive.right_scale * (samples[i].travel_m[1] - samples[i - 1].travel_m[1]);
-      const double turn_rad = (right_m - left_m) / drive.track_m;
-      const double along_m = 0.5 * (left_m + right_m) - y_m * turn_rad;
-      expected_m += std::copysign(std::hypot(along_m, drive.wheelbase_m * turn_rad), along_m);
-      if (samples[i].time_s < samples[begin].time_s + kBlockS) continue;
-      const double measured_m = samples[i].travel_m.at(wheel) - samples[begin].travel_m.at(wheel);
-      if (std::abs(measured_m) > kLeastM) ratios.push_back(expected_m / measured_m);
-      expected_m = 0.0;
-      begin = i;
-    }
+    std::vector<double> ratios = FrontRatios(recording, calibration.drive, wheel);
     CalibratedParameter parameter{.name = wheel == 2 ? "front_left_scale" : "front_right_scale",
                                   .before = 1.0,
                                   .expected_sigma = 0.05,
                                   .after = 1.0,
                                   .sigma = 0.05};
-    constexpr std::size_t kLeastRatios = 5;
     if (ratios.size() >= kLeastRatios) {
-      const auto median = [](std::vector<double> values) {
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        return *middle;
-      };
-      parameter.after = median(ratios);
+      parameter.after = Median(ratios);
       for (double& ratio : ratios)
         ratio = std::abs(ratio - parameter.after);
       // Of a normal distribution: sigma from the median deviation, and of a median from sigma.
       parameter.sigma =
-          1.4826 * median(ratios) * 1.2533 / std::sqrt(static_cast<double>(ratios.size()));
+          1.4826 * Median(ratios) * 1.2533 / std::sqrt(static_cast<double>(ratios.size()));
       parameter.is_known = true;
     }
     calibration.parameters.push_back(parameter);
@@ -361,6 +368,7 @@ void CalibrateFront(const OdometryRecording& recording, OdometryCalibration& cal
 
 std::vector<std::string> CalibrationParameterNames() {
   std::vector<std::string> names;
+  names.reserve(kWheelPriors.size() + kYawRatePriors.size() + kSteeringPriors.size());
   for (const Prior& prior : kWheelPriors)
     names.emplace_back(prior.name);
   for (const Prior& prior : kYawRatePriors)
