@@ -61,7 +61,7 @@ std::optional<TrainerState> ParseState(std::string_view bytes, const std::string
   const std::string_view content = bytes.substr(0, bytes.size() - kHashSize);
   if (Sha256Hex(content) != bytes.substr(content.size())) return std::nullopt;
   std::string_view rest = content;
-  for (const std::string_view expected : {kStateMagic, std::string_view(fingerprint)}) {
+  for (const std::string_view expected : {kStateMagic, std::string_view{fingerprint}}) {
     if (!rest.starts_with(expected)) return std::nullopt;
     rest.remove_prefix(expected.size());
   }

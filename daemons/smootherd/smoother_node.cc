@@ -270,7 +270,7 @@ void SmootherNode::ChangeMap(const std::string& map_id) {
 
 void SmootherNode::StartAnew() {
   smoother_ = FixedLagSmoother(config_.smoother);
-  last_published_X_WB_.reset();
+  published_WB_.reset();
   if (!last_odometry_) return;
   OdometryStep first;
   first.time = FromNanoseconds(last_odometry_->mono_ns);
@@ -332,13 +332,13 @@ void SmootherNode::PublishLocalization(const odometry_t& message,
     answer.y_WB_m = estimate.X_WB.y();
     answer.yaw_WB_rad = estimate.X_WB.yaw();
     Eigen::Map<Eigen::Matrix3d>(answer.covariance) = estimate.covariance;  // symmetric
-    if (last_published_X_WB_) {
-      const Pose2 expected = *last_published_X_WB_ * step_since_published_;
+    if (published_WB_) {
+      const Pose2 expected = *published_WB_ * step_since_published_;
       const Pose2 jump = expected.Inverse() * estimate.X_WB;
       answer.jump_m = jump.translation().norm();
       answer.jump_rad = std::abs(jump.yaw());
     }
-    last_published_X_WB_ = estimate.X_WB;
+    published_WB_ = estimate.X_WB;
   }
   const SmootherCounters& counters = smoother_.counters();
   answer.fixes_accepted = counters.fixes_accepted + counters.fixes_redundant;
@@ -357,11 +357,11 @@ void SmootherNode::PublishLocalization(const odometry_t& message,
 void SmootherNode::PublishMapToOdom(std::int64_t utime, const SmootherEstimate& estimate) {
   if (estimate.status == SmootherStatus::kUninitialised) return;
   const Pose2 X_WO = estimate.X_WB * X_OBOf(*last_odometry_).Inverse();
-  if (last_published_X_WO_) {
-    const Pose2 move = last_published_X_WO_->Inverse() * X_WO;
+  if (published_WO_) {
+    const Pose2 move = published_WO_->Inverse() * X_WO;
     if (move.translation().norm() <= kLeastMove && std::abs(move.yaw()) <= kLeastMove) return;
   }
-  last_published_X_WO_ = X_WO;
+  published_WO_ = X_WO;
   rigid_transform_t transform{};
   transform.utime = utime;
   transform.trans[0] = X_WO.x();
@@ -417,12 +417,10 @@ std::optional<SavedState> SmootherNode::State(const std::string& boot_id) const 
                     .covariance = estimate.covariance};
 }
 
-NodeStatus SmootherNode::Status(const ClockReading& now) const {
-  NodeStatus status;
+void SmootherNode::AddFigures(const SmootherEstimate& estimate, NodeStatus& status) const {
   const auto add = [&status](const char* name, std::int64_t value) {
     status.Add(name, static_cast<double>(value));
   };
-  const SmootherEstimate estimate = smoother_.Estimate();
   const SmootherCounters& counters = smoother_.counters();
   add("status", static_cast<std::int64_t>(estimate.status));
   add("odometry", counters_.odometry);
@@ -459,7 +457,12 @@ NodeStatus SmootherNode::Status(const ClockReading& now) const {
   status.Add("time_since_fix_s", estimate.time_since_fix_s.value_or(-1.0));
   status.Add("position_sigma_m",
              std::sqrt(0.5 * estimate.covariance.topLeftCorner<2, 2>().trace()));
+}
 
+NodeStatus SmootherNode::Status(const ClockReading& now) const {
+  NodeStatus status;
+  const SmootherEstimate estimate = smoother_.Estimate();
+  AddFigures(estimate, status);
   if (!last_odometry_) {
     status.Raise(status_t::ERROR, "no odometry since the start");
     return status;

@@ -88,6 +88,7 @@ class SmootherNode {
   [[nodiscard]] const FixedLagSmoother& smoother() const { return smoother_; }
 
  private:
+  void AddFigures(const SmootherEstimate& estimate, NodeStatus& status) const;
   /// The motion since the last odometry message.
   [[nodiscard]] bool IsOld(const odometry_t& message);
   [[nodiscard]] OdometryStep StepTo(const odometry_t& message);
@@ -116,8 +117,8 @@ class SmootherNode {
   LatencyWindow pose_latency_ms_;
   LatencyWindow fix_latency_ms_;
   std::optional<odometry_t> last_odometry_;
-  std::optional<Pose2> last_published_X_WB_;
-  std::optional<Pose2> last_published_X_WO_;
+  std::optional<Pose2> published_WB_;  ///< X_WB of the last POSE.
+  std::optional<Pose2> published_WO_;  ///< X_WO of the last MAP_TO_ODOM.
   Pose2 step_since_published_;
   std::int64_t next_seq_ = 0;
   std::int64_t last_fix_seq_ = -1;

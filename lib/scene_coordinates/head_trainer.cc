@@ -271,7 +271,7 @@ template <typename Number>
 void Trainer<Number>::RunShard(std::size_t thread, std::size_t shard) {
   const auto rows = static_cast<std::size_t>(config_.batch / kTrainerShards);
   const auto cells =
-      std::span<const std::uint32_t>(order_).subspan(next_in_order_ + shard * rows, rows);
+      std::span<const std::uint32_t>{order_}.subspan(next_in_order_ + shard * rows, rows);
   ShardNetwork<Number>& network = *networks_[thread];
   const auto dimension = static_cast<std::size_t>(set_.dimension);
   for (std::size_t row = 0; row < rows; ++row) {
@@ -280,7 +280,7 @@ void Trainer<Number>::RunShard(std::size_t thread, std::size_t shard) {
   }
   losses_[shard]->Begin(loss_config_, cells);
   network.Run(*losses_[shard],
-              std::span<float>(gradients_).subspan(shard * layout_.size(), layout_.size()));
+              std::span<float>{gradients_}.subspan(shard * layout_.size(), layout_.size()));
 }
 
 template <typename Number>
@@ -293,7 +293,7 @@ void Trainer<Number>::UpdateLayers(std::size_t thread) {
     const std::size_t end = layer + 1 == layers ? layout_.size() : layout_.WeightsBegin(index + 1);
     AverageShards(gradients_.data() + begin, layout_.size(), end - begin, mean);
     optimizer_.UpdateLayer(
-        index, step_, std::span<float>(gradients_).first(layout_.size()), parameters_);
+        index, step_, std::span<float>{gradients_}.first(layout_.size()), parameters_);
     Narrow(parameters_.data() + begin, end - begin, narrow_parameters_.data() + begin);
   }
 }

@@ -388,6 +388,7 @@ Result<FeatureWhitening> FitWhiteningToImages(const std::vector<GrayImage>& imag
   return FitWhitening(samples, (*extractor)->dimension(), outputs);
 }
 
+// NOLINTNEXTLINE(readability-function-size): six different things, none of which belongs to another
 Result<TrainingSet> PrepareTraining(const std::vector<TrainingImage>& images,
                                     const PinholeCamera& camera,
                                     const GradientHistogramsConfig& features,

@@ -34,12 +34,12 @@ double Shrink(double measured, double variance, double prior) {
 
 }  // namespace
 
-Pose2 OdometryDrift::Correct(const Pose2& X_BprevB) {
-  const double way = X_BprevB.translation().norm();
+Pose2 OdometryDrift::Correct(const Pose2& X_AB) {
+  const double way = X_AB.translation().norm();
   corrected_turn_rad_ += rad_per_m_ * way;
   corrected_way_m_ += scale_ * way;
-  const Eigen::Vector2d translation = (1.0 + scale_) * X_BprevB.translation();
-  return {translation.x(), translation.y(), X_BprevB.yaw() + rad_per_m_ * way};
+  const Eigen::Vector2d translation = (1.0 + scale_) * X_AB.translation();
+  return {translation.x(), translation.y(), X_AB.yaw() + rad_per_m_ * way};
 }
 
 void OdometryDrift::Estimate(const KeyframeWindow& window, const Eigen::Matrix3d& covariance) {

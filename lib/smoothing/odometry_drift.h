@@ -18,8 +18,8 @@ class OdometryDrift {
   OdometryDrift(double prior_rad_per_m, double prior_scale)
       : prior_rad_per_m_(prior_rad_per_m), prior_scale_(prior_scale) {}
 
-  /// Puts a motion right.
-  [[nodiscard]] Pose2 Correct(const Pose2& X_BprevB);
+  /// Puts a motion right: of the body from where it was, A, to where it is.
+  [[nodiscard]] Pose2 Correct(const Pose2& X_AB);
 
   /// Estimates the drift anew. Costs a look at each keyframe.
   ///

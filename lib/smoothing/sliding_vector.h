@@ -14,7 +14,7 @@ namespace relocd {
 template <typename T>
 class SlidingVector {
  public:
-  using value_type = T;
+  using value_type = T;  // NOLINT(readability-identifier-naming): containers' own name for it
 
   SlidingVector() = default;
   explicit SlidingVector(std::size_t capacity) { Reserve(capacity); }
