@@ -53,8 +53,8 @@ def install_upgrade_purge():
           "cameras belong to group video")
     said = subprocess.run(["reloc", "doctor", "--json"], stdout=subprocess.PIPE, text=True)
     missing = {check["name"]: check["command"] for check in json.loads(said.stdout)["checks"] if not check["ok"]}
-    # The guest has no time server, and nobody made a map.
-    check(said.returncode == 1 and set(missing) == {"map", "clock"}, f"reloc doctor says what is missing: {missing}")
+    # The guest has no time server, its disk is a part of its small memory, and nobody made a map.
+    check(said.returncode == 1 and set(missing) - {"disk"} == {"map", "clock"}, f"reloc doctor says what is missing: {missing}")
     for page in ("8 relocd", "1 reloc", "1 reloc-map", "1 reloc-status", "8 odometryd"):
         check(output_of("man", "-w", *page.split()).strip().endswith(".gz"), f"man {page}")
     completed = output_of("bash", "-c", ". /usr/share/bash-completion/completions/reloc; COMP_WORDS=(reloc st); COMP_CWORD=1; _reloc; echo ${COMPREPLY[*]}")
