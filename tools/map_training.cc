@@ -296,10 +296,9 @@ Result<void> TrainRegions(const std::vector<RegionFrames>& regions,
   std::atomic<bool> has_failed = false;
   const auto work = [&] {
     for (std::size_t index = next++; index < regions.size() && !has_failed; index = next++) {
-      trained[index] =
-          TrainRegion(index, regions[index], training, [&](double done, std::string_view detail) {
-            line.Show(index, done, detail);
-          });
+      using std::placeholders::_1, std::placeholders::_2;
+      const auto show = std::bind(&TrainingProgressLine::Show, &line, index, _1, _2);
+      trained[index] = TrainRegion(index, regions[index], training, show);
       if (!*trained[index]) has_failed = true;
     }
   };

@@ -109,8 +109,10 @@ double MostApartPx(const CameraIntrinsics& a, const CameraIntrinsics& b) {
   const PinholeCamera camera_b(b);
   double most_px = 0.0;
   for (int i = 0; i <= kSteps * kSteps; ++i) {
-    const Eigen::Vector2d pixel(a.width * (i % kSteps) / static_cast<double>(kSteps - 1),
-                                a.height * (i / kSteps) / static_cast<double>(kSteps));
+    const int column = i % kSteps;
+    const int row = i / kSteps;
+    const Eigen::Vector2d pixel(a.width * column / static_cast<double>(kSteps - 1),
+                                a.height * row / static_cast<double>(kSteps));
     const auto ray = camera_a.Unproject(pixel);
     if (!ray) continue;
     const auto seen = camera_b.Project(ray->homogeneous());
@@ -417,73 +419,86 @@ void AddFrameOptions(CLI::App& command, FrameSelection& frames, const char* spli
   command.add_option("--frames", frames.frames, "A:B, only frames with these indices");
 }
 
+CLI::App* AddCheck(CLI::App& app, CheckCommand& options) {
+  auto* command =
+      app.add_subcommand("check", "whether a data set can make a good map, and why not");
+  command
+      ->add_option(
+          "--dataset", options.datasets, "folder of a data set; more than one may be given")
+      ->required();
+  AddFrameOptions(*command, options.frames, "file of the split: its train rows are checked");
+  command->add_option("--threads", options.threads, "default 2");
+  return command;
+}
+
+CLI::App* AddTrain(CLI::App& app, TrainCommand& options) {
+  auto* command = app.add_subcommand("train", "make a map of a data set");
+  command
+      ->add_option("--dataset",
+                   options.datasets,
+                   "folder of the data set; more than one are drives along the route of the first")
+      ->required();
+  AddFrameOptions(*command, options.frames, "file of the split: its train rows are used");
+  command->add_option("--out", options.out, "the map file to write")->required();
+  command->add_option("--threads", options.options.threads, "default 2");
+  command->add_option("--seed", options.options.seed, "default 1");
+  command->add_option("--report", options.report, "folder for a report on held-out frames");
+  command->add_option("--input-check",
+                      options.input_check,
+                      "what follows from a bad data set: refuse (default), warn, off");
+  command->add_option("--iterations", options.options.head.iterations, "steps for each region");
+  command->add_option("--checkpoint-every",
+                      options.options.checkpoint_every_s,
+                      "seconds after which a region in training is kept in OUT.partial, from which "
+                      "the same command goes on; default 30");
+  command->add_option("--views", options.options.cells.views_per_image, "changed copies an image");
+  command->add_option("--held-out-every", options.options.held_out_every, "default 8");
+  command->add_option("--region-length", options.options.region_length_m, "default 150 m");
+  return command;
+}
+
+CLI::App* AddCalibrate(CLI::App& app, CalibrateCommand& options) {
+  auto* command = app.add_subcommand(
+      "calibrate", "measure anew how far a map's covariances and confidences can be trusted");
+  command->add_option("--map", options.map, "the map file")->required();
+  command->add_option("--dataset", options.datasets, "as given to train, in this order")
+      ->required();
+  AddFrameOptions(*command, options.frames, "file of the split: its train rows are used");
+  command->add_option("--held-out-every",
+                      options.held_out_every,
+                      "as given to train: the frames that it did not learn from");
+  command->add_option("--out", options.out, "the map file to write")->required();
+  command->add_option("--threads", options.threads, "default 2");
+  return command;
+}
+
+CLI::App* AddLocalize(CLI::App& app, LocalizeCommand& options) {
+  auto* command = app.add_subcommand("localize", "find the images of a data set in a map");
+  command->add_option("--map", options.map, "the map file")->required();
+  command->add_option("--dataset", options.frames.dataset, "folder of the data set")->required();
+  AddFrameOptions(*command, options.frames, "file of the split: its test rows are used");
+  command->add_option("--out", options.out, "poses.csv to write")->required();
+  command->add_option("--threads", options.threads, "default 1; each has an image of its own");
+  command->add_option("--disturb",
+                      options.disturbance,
+                      "gamma, dark, blur, noise or occluders: what is done to the images first");
+  command->add_flag("--fit-size",
+                    options.fits_size,
+                    "cut and resize images of another camera, to see that they are not found");
+  return command;
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("Makes a map of a recorded drive, and finds images in it.", "reloc map");
   app.require_subcommand(1);
-
   CheckCommand check;
-  auto* check_app =
-      app.add_subcommand("check", "whether a data set can make a good map, and why not");
-  check_app
-      ->add_option("--dataset", check.datasets, "folder of a data set; more than one may be given")
-      ->required();
-  AddFrameOptions(*check_app, check.frames, "file of the split: its train rows are checked");
-  check_app->add_option("--threads", check.threads, "default 2");
-
+  const CLI::App* check_app = AddCheck(app, check);
   TrainCommand train;
-  auto* train_app = app.add_subcommand("train", "make a map of a data set");
-  train_app
-      ->add_option("--dataset",
-                   train.datasets,
-                   "folder of the data set; more than one are drives along the route of the first")
-      ->required();
-  AddFrameOptions(*train_app, train.frames, "file of the split: its train rows are used");
-  train_app->add_option("--out", train.out, "the map file to write")->required();
-  train_app->add_option("--threads", train.options.threads, "default 2");
-  train_app->add_option("--seed", train.options.seed, "default 1");
-  train_app->add_option("--report", train.report, "folder for a report on held-out frames");
-  train_app->add_option("--input-check",
-                        train.input_check,
-                        "what follows from a bad data set: refuse (default), warn, off");
-  train_app->add_option("--iterations", train.options.head.iterations, "steps for each region");
-  train_app->add_option(
-      "--checkpoint-every",
-      train.options.checkpoint_every_s,
-      "seconds after which a region in training is kept in OUT.partial, from which "
-      "the same command goes on; default 30");
-  train_app->add_option("--views", train.options.cells.views_per_image, "changed copies an image");
-  train_app->add_option("--held-out-every", train.options.held_out_every, "default 8");
-  train_app->add_option("--region-length", train.options.region_length_m, "default 150 m");
-
+  const CLI::App* train_app = AddTrain(app, train);
   CalibrateCommand calibrate;
-  auto* calibrate_app = app.add_subcommand(
-      "calibrate", "measure anew how far a map's covariances and confidences can be trusted");
-  calibrate_app->add_option("--map", calibrate.map, "the map file")->required();
-  calibrate_app->add_option("--dataset", calibrate.datasets, "as given to train, in this order")
-      ->required();
-  AddFrameOptions(*calibrate_app, calibrate.frames, "file of the split: its train rows are used");
-  calibrate_app->add_option("--held-out-every",
-                            calibrate.held_out_every,
-                            "as given to train: the frames that it did not learn from");
-  calibrate_app->add_option("--out", calibrate.out, "the map file to write")->required();
-  calibrate_app->add_option("--threads", calibrate.threads, "default 2");
-
+  const CLI::App* calibrate_app = AddCalibrate(app, calibrate);
   LocalizeCommand localize;
-  auto* localize_app = app.add_subcommand("localize", "find the images of a data set in a map");
-  localize_app->add_option("--map", localize.map, "the map file")->required();
-  localize_app->add_option("--dataset", localize.frames.dataset, "folder of the data set")
-      ->required();
-  AddFrameOptions(*localize_app, localize.frames, "file of the split: its test rows are used");
-  localize_app->add_option("--out", localize.out, "poses.csv to write")->required();
-  localize_app->add_option(
-      "--threads", localize.threads, "default 1; each has an image of its own");
-  localize_app->add_option(
-      "--disturb",
-      localize.disturbance,
-      "gamma, dark, blur, noise or occluders: what is done to the images first");
-  localize_app->add_flag("--fit-size",
-                         localize.fits_size,
-                         "cut and resize images of another camera, to see that they are not found");
+  const CLI::App* localize_app = AddLocalize(app, localize);
 
   std::string map_path;
   bool json = false;
