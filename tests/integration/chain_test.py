@@ -240,7 +240,7 @@ def messages():
 
     vehicle = VEHICLE.read_text()
     dbc = VEHICLE.with_name("differential_demo.dbc")
-    no_signal = write("no_signal.yaml", vehicle.replace("differential_demo.dbc", str(write("no_signal.dbc", dbc.read_text().replace("SG_ ", "SG_ X")))))
+    no_signal = write("no_signal.yaml", vehicle.replace("differential_demo.dbc", str(write("no_signal.dbc", dbc.read_text().replace("\n SG_ ", "\n SG_ X")))))
     odometry = [reloc, "odometry", "--out", out / "odo.csv", "--config"]
     expect_refusal(78, r"no_signal.dbc: has no signal .*nearest are", *odometry, no_signal, "--can", CAN_LOG)
     expect_refusal(78, r"bad_candump.log: line 2", *odometry, VEHICLE, "--can", write("bad_candump.log", "(0.1) can0 1A0#00\nhello\n"))
