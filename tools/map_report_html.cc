@@ -6,6 +6,7 @@
 
 #include "base64.h"
 #include "core/file.h"
+#include "escape_html.h"
 #include "map_report.h"
 
 namespace relocd {
@@ -32,29 +33,6 @@ constexpr std::string_view kKey =
     "0.25 m<i style=\"background:#e6a01e\"></i>less than 1 m<i style=\"background:#d55e00\"></i>"
     "more<i style=\"background:#be1860\"></i>not found</p>\n";
 
-std::string Escaped(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
 void AppendRegions(const TrainingReport& report, std::string& html) {
   html +=
       "<h2>Regions</h2>\n<div class=\"wide\"><table>\n<thead><tr><th></th><th>metres</th>"
@@ -66,7 +44,7 @@ void AppendRegions(const TrainingReport& report, std::string& html) {
                    "<tr><td>{}</td><td>{:.0f} – {:.0f}</td><td>{}</td><td>{} of {}</td>"
                    "<td>{:.3f}</td><td>{:.2f}</td><td>{:.3f}</td><td>{:.0f} %</td><td>{:.0f} %</td>"
                    "</tr>\n",
-                   Escaped(region.name),
+                   EscapeHtml(region.name),
                    region.begin_m,
                    region.end_m,
                    region.training_frames,
@@ -96,13 +74,13 @@ Result<void> AppendWeak(const TrainingReport& report, std::string& html) {
       const auto jpeg = ReadFile(report.held_out[stretch.worst].image);
       if (!jpeg) return jpeg.error();
       picture = fmt::format("<img alt=\"{}\" src=\"data:image/jpeg;base64,{}\">",
-                            Escaped(report.held_out[stretch.worst].name),
+                            EscapeHtml(report.held_out[stretch.worst].name),
                             EncodeBase64(*jpeg));
     }
     fmt::format_to(std::back_inserter(html),
                    "<figure>{}<figcaption>{}</figcaption></figure>\n",
                    picture,
-                   Escaped(DescribeWeakStretch(stretch)));
+                   EscapeHtml(DescribeWeakStretch(stretch)));
   }
   html += "</div>\n";
   return {};
@@ -120,7 +98,7 @@ void AppendLive(const TrainingReport& report, std::string& html) {
     for (const LiveAccuracy& live : region.live) {
       fmt::format_to(std::back_inserter(html),
                      "<tr><td>{}</td><td>{}</td><td>{} of {}</td><td>{:.2f}</td></tr>\n",
-                     Escaped(region.name),
+                     EscapeHtml(region.name),
                      live.iteration,
                      live.localized,
                      live.frames,
@@ -140,7 +118,7 @@ Result<std::string> FormatTrainingReportHtml(const TrainingReport& report) {
       "regions. {4} of {5} held-out images are found, with a median error of {6:.3f} m (p95 "
       "{7:.3f} "
       "m); {8:.0f} % of them are inside the reported 95 % region.</p>\n",
-      Escaped(report.datasets),
+      EscapeHtml(report.datasets),
       kStyle,
       report.route_m,
       report.regions.size(),
@@ -162,7 +140,7 @@ Result<std::string> FormatTrainingReportHtml(const TrainingReport& report) {
   fmt::format_to(std::back_inserter(html),
                  "<p class=\"soft\">{}. Held-out images are of the same drives as the others: on "
                  "another day, in other light, errors are larger.</p>\n</body>\n</html>\n",
-                 Escaped(report.how));
+                 EscapeHtml(report.how));
   return html;
 }
 

@@ -7,6 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "escape_html.h"
+
+#include "escape_html.h"
+
 namespace relocd {
 namespace {
 
@@ -59,32 +63,9 @@ figcaption b{font-size:.95rem}
 .red{color:var(--bad);font-weight:600}
 )";
 
-std::string Escaped(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
 /// Statuses for people: `dead_reckoning` is `dead reckoning`.
 std::string Words(std::string_view status) {
-  std::string words = Escaped(status);
+  std::string words = EscapeHtml(status);
   std::ranges::replace(words, '_', ' ');
   return words;
 }
@@ -100,8 +81,8 @@ void AppendCard(std::string_view kind,
   fmt::format_to(std::back_inserter(html),
                  "<div class=\"card {}\"><b>{}</b><span>{}</span></div>\n",
                  kind,
-                 Escaped(number),
-                 Escaped(text));
+                 EscapeHtml(number),
+                 EscapeHtml(text));
 }
 
 void AppendCards(const DriveReport& report, std::string& html) {
@@ -149,7 +130,7 @@ void AppendErrorRow(const ReportRow& row, std::string& html) {
   fmt::format_to(std::back_inserter(html),
                  "<tr class=\"{}\"><td>{}</td><td>{}</td>",
                  row.key,
-                 Escaped(row.name),
+                 EscapeHtml(row.name),
                  row.position_m.count);
   if (!row.evaluation) {
     html += "<td colspan=\"9\">no pose to compare</td></tr>\n";
@@ -186,7 +167,7 @@ void AppendCoverageTable(const DriveReport& report, std::string& html) {
       "y)</th><th>with heading</th><th>median sigma, m</th></tr></thead>\n<tbody>\n";
   for (const ReportRow* row : {&report.camera, &report.fused}) {
     fmt::format_to(
-        std::back_inserter(html), "<tr class=\"{}\"><td>{}</td>", row->key, Escaped(row->name));
+        std::back_inserter(html), "<tr class=\"{}\"><td>{}</td>", row->key, EscapeHtml(row->name));
     if (row->evaluation && row->evaluation->coverage.position_count > 0) {
       const Coverage& coverage = row->evaluation->coverage;
       fmt::format_to(std::back_inserter(html),
@@ -238,7 +219,7 @@ void AppendLatencies(const DriveReport& report, std::string& html) {
   for (const ReportedLatency& latency : report.log->latencies) {
     fmt::format_to(std::back_inserter(html),
                    "<tr><td>{}</td><td>{:.2f}</td><td>{:.2f}</td></tr>\n",
-                   Escaped(latency.name),
+                   EscapeHtml(latency.name),
                    latency.p50_ms,
                    latency.p99_ms);
   }
@@ -320,9 +301,9 @@ std::string FormatReportHtml(const DriveReport& report,
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<title>{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>{0}</h1>\n<p>{2}.</p>\n",
-      Escaped(report.title),
+      EscapeHtml(report.title),
       kStyle,
-      Escaped(DescribeOutcome(report)));
+      EscapeHtml(DescribeOutcome(report)));
   AppendCards(report, html);
   html += "<h2>From above</h2>\n";
   AppendFigure(drive, "The drive from above: truth, odometry, camera and fused poses", html);
@@ -330,7 +311,7 @@ std::string FormatReportHtml(const DriveReport& report,
   AppendErrorTable(report, html);
   fmt::format_to(std::back_inserter(html),
                  "<p class=\"soft\">Images: {}.</p>\n",
-                 Escaped(DescribeImages(report)));
+                 EscapeHtml(DescribeImages(report)));
   html += "<h2>Errors over time</h2>\n";
   AppendFigure(errors, "The errors of position and heading over time", html);
   html += "<h2>How honest the reported uncertainty is</h2>\n";
@@ -342,7 +323,7 @@ std::string FormatReportHtml(const DriveReport& report,
       std::back_inserter(html),
       "<p class=\"soft\">Truth: {}. Odometry alone starts at the true first pose; aligned, "
       "it is laid over the truth as well as it goes.</p>\n</body>\n</html>\n",
-      Escaped(report.truth_path));
+      EscapeHtml(report.truth_path));
   return html;
 }
 
