@@ -9,8 +9,6 @@
 
 #include "escape_html.h"
 
-#include "escape_html.h"
-
 namespace relocd {
 namespace {
 
