@@ -152,12 +152,10 @@ Result<Tables> Process(const Options& options,
   if (!log) return std::move(log).error();
   Tables tables{.odometry = OdometryHeader(), .signals = SignalsHeader(odometry.signals())};
   while (true) {
-    auto record = log->Next();
-    if (!record) return std::move(record).error();
-    if (!record->has_value()) break;
-    const CandumpRecord& frame = **record;
-    if (frame.interface != interface || frame.frame.error || frame.frame.remote) continue;
-    const auto increment = odometry.Handle(frame.frame);
+    auto frame = log->NextDataFrame(interface);
+    if (!frame) return std::move(frame).error();
+    if (!frame->has_value()) break;
+    const auto increment = odometry.Handle(**frame);
     if (odometry.last_sample()) {
       AppendSignals(odometry.signals(), *odometry.last_sample(), tables.signals);
     }

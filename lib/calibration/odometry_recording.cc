@@ -89,12 +89,10 @@ Result<OdometryRecording> RecordOdometry(const std::string& can_log,
   auto log = CandumpLog::Open(can_log);
   if (!log) return std::move(log).error();
   while (true) {
-    auto record = log->Next();
-    if (!record) return std::move(record).error();
-    if (!record->has_value()) break;
-    const CandumpRecord& frame = **record;
-    if (frame.interface != interface || frame.frame.error || frame.frame.remote) continue;
-    recorder.Handle(frame.frame);
+    auto frame = log->NextDataFrame(interface);
+    if (!frame) return std::move(frame).error();
+    if (!frame->has_value()) break;
+    recorder.Handle(**frame);
   }
   if (recorder.recording().samples.size() < 2) {
     return Error{ErrorKind::kInvalidInput,

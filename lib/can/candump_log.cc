@@ -213,6 +213,17 @@ Result<std::optional<CandumpRecord>> CandumpLog::Next() {
   return std::optional<CandumpRecord>();
 }
 
+Result<std::optional<CanFrame>> CandumpLog::NextDataFrame(std::string_view interface) {
+  while (true) {
+    auto record = Next();
+    if (!record) return std::move(record).error();
+    if (!record->has_value()) return std::optional<CanFrame>();
+    const CanFrame& frame = (*record)->frame;
+    if ((*record)->interface == interface && !frame.error && !frame.remote)
+      return std::optional(frame);
+  }
+}
+
 Result<void> CandumpLog::CheckOrder(const CandumpRecord& record) {
   const auto [last, is_first] = last_times_ns_.try_emplace(record.interface, record.time_ns);
   if (record.time_ns < last->second) {

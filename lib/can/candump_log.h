@@ -45,6 +45,11 @@ class CandumpLog {
   ///         of the frame before it on the same interface.
   Result<std::optional<CandumpRecord>> Next();
 
+  /// The next frame of `interface` that holds data: neither an error frame nor a remote one.
+  ///
+  /// @return as Next.
+  Result<std::optional<CanFrame>> NextDataFrame(std::string_view interface);
+
  private:
   CandumpLog(std::unique_ptr<std::istream> stream, std::string path);
 

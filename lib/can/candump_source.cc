@@ -92,19 +92,18 @@ Result<std::optional<CanFrame>> CandumpSource::Receive() {
 Result<void> CandumpSource::ReadNext() {
   next_.reset();
   while (true) {
-    auto record = log_->Next();
-    if (!record) return std::move(record).error();
-    if (!record->has_value()) return {};
-    if (!IsWanted(**record)) continue;
-    next_ = (*record)->frame;
-    next_->receive_time = epoch_ + Duration((*record)->time_ns - start_ns_);
+    auto frame = log_->NextDataFrame(interface_);
+    if (!frame) return std::move(frame).error();
+    if (!frame->has_value()) return {};
+    if (!IsWanted((*frame)->id)) continue;
+    next_ = *frame;
+    next_->receive_time = epoch_ + Duration(ToNanoseconds((*frame)->receive_time) - start_ns_);
     return {};
   }
 }
 
-bool CandumpSource::IsWanted(const CandumpRecord& record) const {
-  if (record.interface != interface_ || record.frame.error || record.frame.remote) return false;
-  return ids_.empty() || std::find(ids_.begin(), ids_.end(), record.frame.id) != ids_.end();
+bool CandumpSource::IsWanted(const CanId& id) const {
+  return ids_.empty() || std::find(ids_.begin(), ids_.end(), id) != ids_.end();
 }
 
 /// A time of zero disarms.

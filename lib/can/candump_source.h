@@ -33,7 +33,7 @@ class CandumpSource final : public CanSource {
  private:
   Result<void> ReadNext();
   Result<void> ArmTimer(MonotonicTime due);
-  [[nodiscard]] bool IsWanted(const CandumpRecord& record) const;
+  [[nodiscard]] bool IsWanted(const CanId& id) const;
 
   std::string path_;
   std::string interface_;

@@ -161,6 +161,22 @@ TEST(CandumpLogTest, EndsWithNothing) {
   EXPECT_FALSE(end->has_value());
 }
 
+TEST(CandumpLogTest, GivesTheDataFramesOfOneInterface) {
+  CandumpLog log = CandumpLog::FromText(
+      "(1.0) can1 123#01\n(1.1) can0 20000080#0000000000000000\n(1.2) can0 123#R\n"
+      "(1.3) can0 124#02\n(1.4) can0 oops\n",
+      "x.log");
+  const auto frame = log.NextDataFrame("can0");
+  ASSERT_TRUE(frame && frame->has_value());
+  EXPECT_EQ((*frame)->id.value, 0x124U);
+  EXPECT_EQ(ToNanoseconds((*frame)->receive_time), 1'300'000'000);
+  EXPECT_EQ(log.NextDataFrame("can0").error().message,
+            "x.log: line 5: frame 'oops', must be ID#DATA");
+  const auto end = log.NextDataFrame("can0");
+  ASSERT_TRUE(end);
+  EXPECT_FALSE(end->has_value());
+}
+
 TEST(CandumpLogTest, RefusesTimesThatDecreaseOnAnInterface) {
   CandumpLog log = CandumpLog::FromText(
       "(2.0) can0 123#01\n(1.9) can1 123#01\n(2.0) can0 123#01\n(1.5) can0 123#01\n", "x.log");
