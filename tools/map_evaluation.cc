@@ -7,10 +7,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <thread>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "camera/jpeg.h"
 #include "core/file.h"
@@ -163,6 +166,19 @@ PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalizatio
   errors.within_1m = static_cast<double>(near) / static_cast<double>(errors.frames);
   errors.within_95 = static_cast<double>(inside) / static_cast<double>(errors.localized);
   return errors;
+}
+
+std::string FormatAccuracy(const PoseErrors& errors) {
+  if (errors.localized == 0) return "none found";
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  return fmt::format(
+      "median {:.3f} m, {:.3f} deg; p95 {:.3f} m; within 1 m {:.1f} %; inside the reported 95 % "
+      "region {:.0f} %",
+      errors.median_m,
+      errors.median_rad * kDegrees,
+      errors.p95_m,
+      100.0 * errors.within_1m,
+      100.0 * errors.within_95);
 }
 
 }  // namespace relocd

@@ -52,6 +52,9 @@ struct PoseErrors {
 
 PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalization>& localizations);
 
+/// How well the localized frames were: median, p95 and so on, without how many they are.
+std::string FormatAccuracy(const PoseErrors& errors);
+
 /// The error of a pose, as its covariance sees it: X_WC_true = X_WC * Exp(error).
 Vector6d PoseError(const SceneMap& map, const FrameLocalization& localization);
 

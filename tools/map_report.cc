@@ -4,15 +4,12 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
-#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
 
 namespace relocd {
 namespace {
-
-constexpr double kDegrees = 180.0 / std::numbers::pi;
 
 HeldOutFrame MakeHeldOut(const SceneMap& map,
                          const RouteFrame& frame,
@@ -78,18 +75,11 @@ RegionReport MakeRegionReport(const TrainedMap& trained, std::size_t index) {
   return report;
 }
 
-std::string FormatAccuracy(const PoseErrors& errors) {
-  if (errors.localized == 0) return fmt::format("none of {} held-out images found", errors.frames);
-  return fmt::format(
-      "{} of {} held-out images found: median {:.3f} m, {:.3f} deg; p95 {:.3f} m; within 1 m "
-      "{:.1f} %; inside the reported 95 % region {:.0f} %",
-      errors.localized,
-      errors.frames,
-      errors.median_m,
-      errors.median_rad * kDegrees,
-      errors.p95_m,
-      100.0 * errors.within_1m,
-      100.0 * errors.within_95);
+std::string FormatHeldOut(const PoseErrors& errors) {
+  return fmt::format("{} of {} held-out images found: {}",
+                     errors.localized,
+                     errors.frames,
+                     FormatAccuracy(errors));
 }
 
 }  // namespace
@@ -176,7 +166,7 @@ TrainingReport MakeTrainingReport(const TrainedMap& trained, const MapTrainingOp
 }
 
 std::string FormatTrainingReport(const TrainingReport& report) {
-  std::string text = fmt::format("held-out training frames: {}\n", FormatAccuracy(report.errors));
+  std::string text = fmt::format("held-out training frames: {}\n", FormatHeldOut(report.errors));
   auto out = std::back_inserter(text);
   fmt::format_to(out, "{}, {:.0f} m, {}\n", report.datasets, report.route_m, report.how);
   for (const RegionReport& region : report.regions) {
@@ -187,7 +177,7 @@ std::string FormatTrainingReport(const TrainingReport& report) {
                    region.begin_m,
                    region.end_m,
                    region.training_frames,
-                   FormatAccuracy(region.errors),
+                   FormatHeldOut(region.errors),
                    region.covariance_factor,
                    region.confidence_threshold);
     for (const LiveAccuracy& live : region.live) {

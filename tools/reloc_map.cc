@@ -150,17 +150,13 @@ Result<void> CheckCamera(const SceneMap& map, const std::string& name, const Dat
 
 std::string FormatErrors(const PoseErrors& errors) {
   return fmt::format(
-      "localized {} of {} frames: median {:.3f} m, {:.3f} deg; p95 {:.3f} m; within 1 m {:.1f} %; "
-      "off by > 10 m {}; inside the reported 95 % region {:.0f} %; rank correlation of sigma and "
-      "error {:.2f}; {:.1f} ms a frame, p99 {:.1f} ms\n",
+      "localized {} of {} frames: {}; off by > 10 m {}; rank correlation of sigma and error "
+      "{:.2f}; "
+      "{:.1f} ms a frame, p99 {:.1f} ms\n",
       errors.localized,
       errors.frames,
-      errors.median_m,
-      errors.median_rad * kDegrees,
-      errors.p95_m,
-      100.0 * errors.within_1m,
+      FormatAccuracy(errors),
       errors.wrong_10m,
-      100.0 * errors.within_95,
       errors.sigma_rank_correlation,
       errors.median_ms,
       errors.p99_ms);
