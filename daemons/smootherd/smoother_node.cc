@@ -227,7 +227,6 @@ void SmootherNode::Handle(const camera_pose_t& message) {
   if (outcome == FixOutcome::kAccepted || outcome == FixOutcome::kRedundant) {
     last_fix_seq_ = message.seq;
   }
-  if (last_odometry_) PublishMapToOdom(message.utime, smoother_.Estimate());
 }
 
 std::optional<Fix> SmootherNode::ToFix(const camera_pose_t& message) {

@@ -42,11 +42,13 @@ class SmootherNode {
   /// boot and not too old. To be called before the first message.
   void Restore(const SavedState& state, const std::string& boot_id);
 
-  /// Publishes LOCALIZATION, and POSE when there is one. A message that is not newer than the last
-  /// one, or not usable, is counted and has no effect.
+  /// Publishes POSE when there is one, LOCALIZATION, and MAP_TO_ODOM if the fixes since the last
+  /// message moved the odometry frame. A message that is not newer than the last one, or not
+  /// usable, is counted and has no effect.
   void Handle(const odometry_t& message);
 
-  /// Puts a fix in. Publishes MAP_TO_ODOM if that moved the odometry frame.
+  /// Puts a fix in. Publishes nothing, so that an odometry message that came meanwhile waits no
+  /// longer than it must.
   void Handle(const camera_pose_t& message);
 
   /// Somebody says where the body is, from now on: by hand, or another system. A pose that is not

@@ -189,14 +189,28 @@ TEST_F(SmootherNodeTest, FollowsTheBodyOnTheMap) {
 
 TEST_F(SmootherNodeTest, MapToOdomTakesTheOdometrysPoseToTheMaps) {
   DriveFor(20.0);
+  node_->Handle(Drive());  // takes up the last fix
+  bus_.HandlePending();
   ASSERT_FALSE(transforms_.empty());
   const rigid_transform_t& last = transforms_.back();
   const Pose2 X_WO(last.trans[0], last.trans[1], 2.0 * std::atan2(last.quat[3], last.quat[0]));
+  EXPECT_LT(((X_WO * X_OB_).translation() - LastPose().translation()).norm(), 1e-9);
+  EXPECT_LE(transforms_.size(), localizations_.size());  // the drift that is put right moves O
+}
+
+TEST_F(SmootherNodeTest, AFixPublishesNothingByItselfAndIsInTheNextPose) {
+  DriveFor(20.0);
   node_->Handle(Drive());
   bus_.HandlePending();
-  EXPECT_LT(((X_WO * X_OB_).translation() - LastPose().translation()).norm(), 1e-3);
-  EXPECT_LE(transforms_.size(),
-            localizations_.size() + 21U);  // the drift that is put right moves O
+  const std::size_t before = poses_.size() + localizations_.size() + transforms_.size();
+  node_->Handle(Fix());
+  bus_.HandlePending();
+  EXPECT_EQ(poses_.size() + localizations_.size() + transforms_.size(), before);
+  const std::int64_t fix_seq = fix_seq_ - 1;
+  node_->Handle(Drive());
+  bus_.HandlePending();
+  EXPECT_EQ(poses_.size() + localizations_.size() + transforms_.size(), before + 3);
+  EXPECT_EQ(localizations_.back().last_fix_seq, fix_seq);
 }
 
 TEST_F(SmootherNodeTest, ALostMessageIsBridged) {
