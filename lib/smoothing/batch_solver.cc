@@ -98,8 +98,10 @@ class WindowProblem {
   WindowProblem(KeyframeWindow& window, const FixWeighting& weighting)
       : cauchy_(weighting.cauchy_scale_sigmas()), problem_(ProblemOptions()) {
     Keyframe& oldest = window.keyframes.front();
-    const PlanarPose prior = window.prior.value_or(
-        PlanarPose{.X_WB = oldest.X_WK(), .covariance = kUnknownSigmas.cwiseAbs2().asDiagonal()});
+    const PlanarPose prior =
+        window.prior ? window.prior->pose
+                     : PlanarPose{.X_WB = oldest.X_WK(),
+                                  .covariance = kUnknownSigmas.cwiseAbs2().asDiagonal()};
     AddFix(AbsolutePoseResidual::OfPose(prior.X_WB, Pose2(), prior.covariance), nullptr, oldest);
     for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
       problem_.AddResidualBlock(new MotionCost(window.keyframes[i].MotionResidual()),

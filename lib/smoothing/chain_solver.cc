@@ -73,6 +73,7 @@ void ChainSolver::Synchronize(const KeyframeWindow& window) {
     Node node;
     node.id = keyframe.id;
     node.reference = keyframe.x_WK;
+    if (i > 0) node.seconds_before = ToSeconds(keyframe.time - window.keyframes[i - 1].time);
     node.residual = keyframe.MotionResidual();
     nodes_.push_back(node);
     first_dirty_ = std::min(first_dirty_, i);
@@ -121,6 +122,7 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
                                  Node& node) {
   node.information.setZero();
   node.rhs.setZero();
+  node.rhs_by_bias.setZero();
   node.largest_information_m = 0.0;
   node.largest_information_rad = 0.0;
   node.weighted_at = node.estimate();
@@ -137,6 +139,7 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
     const Eigen::Matrix3d gradient = weight * at.by_K.transpose() * information;
     node.information += gradient * at.by_K;
     node.rhs -= gradient * (at.error - at.by_K * node.delta);
+    node.rhs_by_bias += gradient * fix->bias_scale.asDiagonal();
     node.largest_information_m =
         std::max({node.largest_information_m, information(0, 0), information(1, 1)});
     node.largest_information_rad = std::max(node.largest_information_rad, information(2, 2));
@@ -146,16 +149,16 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
 
 ChainSolver::Prediction ChainSolver::FromPrior(const KeyframeWindow& window) const {
   if (!window.prior) {
-    return {Eigen::Vector3d::Zero(), kUnknownSigmas.cwiseAbs2().asDiagonal()};
+    return {Eigen::Vector3d::Zero(), kUnknownSigmas.cwiseAbs2().asDiagonal(), {}};
   }
-  const Pose2& X_WM = window.prior->X_WB;
+  const Pose2& X_WM = window.prior->pose.X_WB;
   const Eigen::Vector3d& reference = nodes_.front().reference;
   Eigen::Vector3d mean;
   mean << X_WM.translation() - reference.head<2>(), WrapAngle(X_WM.yaw() - reference.z());
-  return {mean, AlongMap(window.prior->covariance, X_WM.yaw())};
+  return {mean, AlongMap(window.prior->pose.covariance, X_WM.yaw()), window.prior->bias};
 }
 
-ChainSolver::Prediction ChainSolver::Predict(std::size_t i) {
+ChainSolver::Prediction ChainSolver::Predict(std::size_t i, const FixWeighting& weighting) {
   Node& before = nodes_[i - 1];
   const Node& node = nodes_[i];
   // by_A * delta_before + by_B * delta + error is zero but for the motion's noise.
@@ -167,14 +170,20 @@ ChainSolver::Prediction ChainSolver::Predict(std::size_t i) {
   before.gain = gain * node.motion.by_B;
   before.offset = before.mean - gain * error;
   // by_B is a rotation: its transpose is its inverse.
+  const Eigen::Matrix3d by_before = -(node.motion.by_B.transpose() * node.motion.by_A);
   return {-(node.motion.by_B.transpose() * error),
-          Symmetric(node.motion.by_B.transpose() * innovation * node.motion.by_B)};
+          Symmetric(node.motion.by_B.transpose() * innovation * node.motion.by_B),
+          {Symmetric(by_before * before.bias.covariance * by_before.transpose()),
+           weighting.BiasKept(node.seconds_before) * by_before * before.bias.cross}};
 }
 
 void ChainSolver::Correct(const Prediction& predicted, double misfit, double damping, Node& node) {
   if (!node.has_fixes && damping <= 0.0) {
     node.mean = predicted.mean;
     node.covariance = predicted.covariance;
+    node.bias = predicted.bias;
+    node.kept.setIdentity();
+    node.by_bias.setZero();
     return;
   }
   Eigen::Matrix3d information = node.information / misfit;
@@ -184,18 +193,27 @@ void ChainSolver::Correct(const Prediction& predicted, double misfit, double dam
     information.diagonal() += hold;
     rhs += hold.cwiseProduct(node.delta);
   }
-  const Eigen::Matrix3d inverse =
-      (Eigen::Matrix3d::Identity() + predicted.covariance * information).inverse();
-  node.mean = inverse * (predicted.mean + predicted.covariance * rhs);
-  node.covariance = Symmetric(inverse * predicted.covariance);
+  node.kept = (Eigen::Matrix3d::Identity() + predicted.covariance * information).inverse();
+  node.mean = node.kept * (predicted.mean + predicted.covariance * rhs);
+  node.covariance = Symmetric(node.kept * predicted.covariance);
+  // The error is kept * (that of the prediction) + by_bias * bias: a bias moves the fixes, and they
+  // the mean.
+  node.by_bias = node.covariance * node.rhs_by_bias / misfit;
+  const Eigen::Matrix3d cross = node.kept * predicted.bias.cross;
+  const Eigen::Matrix3d mixed = cross * node.by_bias.transpose();
+  node.bias.covariance =
+      Symmetric(node.kept * predicted.bias.covariance * node.kept.transpose() + mixed +
+                mixed.transpose() + node.by_bias * node.by_bias.transpose());
+  node.bias.cross = cross + node.by_bias;
 }
 
 void ChainSolver::Eliminate(const KeyframeWindow& window,
-                            double misfit,
+                            const FixWeighting& weighting,
                             double damping,
                             std::size_t end) {
   for (std::size_t i = first_dirty_; i < end; ++i) {
-    Correct(i == 0 ? FromPrior(window) : Predict(i), misfit, damping, nodes_[i]);
+    const Prediction predicted = i == 0 ? FromPrior(window) : Predict(i, weighting);
+    Correct(predicted, weighting.misfit(), damping, nodes_[i]);
   }
   first_dirty_ = std::max(first_dirty_, end);
 }
@@ -266,7 +284,7 @@ bool ChainSolver::IterateUndamped(KeyframeWindow& window,
     Linearize(window, weighting);
     if (first_dirty_ >= nodes_.size()) return true;
     const std::size_t first_new = first_dirty_;
-    Eliminate(window, weighting.misfit(), 0.0, nodes_.size());
+    Eliminate(window, weighting, 0.0, nodes_.size());
     for (Node& node : nodes_)
       node.delta_before_step = node.delta;
     const Step step = Substitute(first_new);
@@ -300,7 +318,7 @@ bool ChainSolver::IterateDamped(KeyframeWindow& window,
     }
     Linearize(window, weighting);
     first_dirty_ = 0;
-    Eliminate(window, weighting.misfit(), damping, nodes_.size());
+    Eliminate(window, weighting, damping, nodes_.size());
     const Step step = Substitute(nodes_.size());
     const double after = AreFinite() ? Cost(window, weighting) : cost;
     const bool is_lower = after < cost;
@@ -317,7 +335,7 @@ bool ChainSolver::IterateDamped(KeyframeWindow& window,
   // The covariances without the damping, at the estimates that were reached.
   Linearize(window, weighting);
   first_dirty_ = 0;
-  Eliminate(window, weighting.misfit(), 0.0, nodes_.size());
+  Eliminate(window, weighting, 0.0, nodes_.size());
   first_dirty_ = 0;  // the estimates are not those of this elimination
   return AreFinite();
 }
@@ -336,9 +354,10 @@ bool ChainSolver::Solve(KeyframeWindow& window, const FixWeighting& weighting, i
   return true;
 }
 
-Eigen::Matrix3d ChainSolver::NewestCovariance() const {
+Eigen::Matrix3d ChainSolver::NewestCovariance(const FixWeighting& weighting) const {
   const Node& newest = nodes_.back();
-  return AlongMap(newest.covariance, -(newest.reference.z() + newest.delta.z()));
+  return AlongMap(newest.covariance + weighting.BiasVariance() * newest.bias.covariance,
+                  -newest.estimate().z());
 }
 
 void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting) {
@@ -346,12 +365,36 @@ void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& 
   Synchronize(window);
   if (nodes_[0].are_fixes_new) LinearizeFixes(window, weighting, nodes_[0]);
   if (nodes_[1].is_motion_new) LinearizeMotion(1);
-  if (first_dirty_ == 0) Eliminate(window, weighting.misfit(), 0.0, 1);
-  const Prediction next = Predict(1);
+  if (first_dirty_ == 0) Eliminate(window, weighting, 0.0, 1);
+  const Prediction next = Predict(1, weighting);
   const Eigen::Vector3d x_WM = nodes_[1].reference + next.mean;
-  window.prior = PlanarPose{.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
-                            .covariance = AlongMap(next.covariance, -x_WM.z())};
+  window.prior = KeyframePrior{.pose = {.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
+                                        .covariance = AlongMap(next.covariance, -x_WM.z())},
+                               .bias = next.bias};
   window.PopFront();
+}
+
+Eigen::Matrix3d ChainSolver::SmoothedBias::Covariance(const FixBiasEffect& filtered) const {
+  // The later biases know of the filter's error only by the bias of this moment (Markov).
+  const Eigen::Matrix3d mixed = kept * filtered.cross * cross.transpose();
+  return kept * filtered.covariance * kept.transpose() + later + mixed + mixed.transpose();
+}
+
+ChainSolver::SmoothedBias ChainSolver::BiasBefore(std::size_t i,
+                                                  const SmoothedBias& after,
+                                                  const FixWeighting& weighting) const {
+  const Node& next = nodes_[i + 1];
+  const Eigen::Matrix3d by_before = -(next.motion.by_B.transpose() * next.motion.by_A);
+  const Eigen::Matrix3d& gain = nodes_[i].gain;
+  const Eigen::Matrix3d by_next_bias = after.kept * next.by_bias;
+  const Eigen::Matrix3d mixed = by_next_bias * after.cross.transpose();
+  SmoothedBias bias;
+  bias.kept -= gain * (after.kept * next.kept - Eigen::Matrix3d::Identity()) * by_before;
+  bias.later = Symmetric(
+      gain * (by_next_bias * by_next_bias.transpose() + after.later + mixed + mixed.transpose()) *
+      gain.transpose());
+  bias.cross = -weighting.BiasKept(next.seconds_before) * gain * (by_next_bias + after.cross);
+  return bias;
 }
 
 std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& window,
@@ -359,19 +402,24 @@ std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& wi
   Invalidate();
   Synchronize(window);
   Linearize(window, weighting);
-  Eliminate(window, weighting.misfit(), 0.0, nodes_.size());
+  Eliminate(window, weighting, 0.0, nodes_.size());
   // Rauch, Tung and Striebel (1965), backwards.
   std::vector<Eigen::Matrix3d> smoothed(nodes_.size());
+  std::vector<Eigen::Matrix3d> with_bias(nodes_.size());
   smoothed.back() = nodes_.back().covariance;
+  SmoothedBias bias;
+  with_bias.back() = smoothed.back() + weighting.BiasVariance() * nodes_.back().bias.covariance;
   for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
-    const Prediction predicted = Predict(i + 1);
+    const Prediction predicted = Predict(i + 1, weighting);
     const Eigen::Matrix3d& gain = nodes_[i].gain;
     smoothed[i] = Symmetric(nodes_[i].covariance +
                             gain * (smoothed[i + 1] - predicted.covariance) * gain.transpose());
+    bias = BiasBefore(i, bias, weighting);
+    with_bias[i] = smoothed[i] + weighting.BiasVariance() * bias.Covariance(nodes_[i].bias);
   }
-  for (std::size_t i = 0; i < smoothed.size(); ++i)
-    smoothed[i] = AlongMap(smoothed[i], -nodes_[i].reference.z());
-  return smoothed;
+  for (std::size_t i = 0; i < with_bias.size(); ++i)
+    with_bias[i] = AlongMap(with_bias[i], -nodes_[i].reference.z());
+  return with_bias;
 }
 
 }  // namespace relocd

@@ -24,7 +24,9 @@ namespace relocd {
 /// moved by a hundredth of their sigma, whose weights under the kernel change.
 ///
 /// Covariances are carried instead of information: a vague prior next to a stiff chain loses no
-/// digits. Allocates nothing once it has seen its largest window. Thread-bound.
+/// digits. Fixes are weighted as if they erred independently; what a bias that lasts does to these
+/// estimates is carried along and added to their covariances (a filter that "considers" it:
+/// Schmidt, 1966). Allocates nothing once it has seen its largest window. Thread-bound.
 class ChainSolver {
  public:
   /// @param capacity  the most keyframes that there will be without an allocation.
@@ -45,8 +47,8 @@ class ChainSolver {
   bool Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
 
   /// The covariance of the newest keyframe's right perturbation given all in the window, as of the
-  /// last Solve: the last block of the elimination.
-  [[nodiscard]] Eigen::Matrix3d NewestCovariance() const;
+  /// last Solve: the last block of the elimination, and what the fixes' bias adds.
+  [[nodiscard]] Eigen::Matrix3d NewestCovariance(const FixWeighting& weighting) const;
 
   /// Takes the oldest keyframe and its fixes out of the window, and leaves what they say of the
   /// next one as its prior. The window must have two keyframes.
@@ -67,11 +69,13 @@ class ChainSolver {
     /// The motion from the node before, whose error at all deltas zero is `motion.error`.
     RelativePoseResidual residual;
     RelativePoseResidual::Linearization motion;
-    double motion_yaw = 0.0;  ///< Of the node before, where it is linearised.
+    double motion_yaw = 0.0;      ///< Of the node before, where it is linearised.
+    double seconds_before = 0.0;  ///< Since the node before.
 
     /// The fixes: information * delta = rhs, without the misfit.
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d rhs_by_bias = Eigen::Matrix3d::Zero();
     Eigen::Vector3d weighted_at = Eigen::Vector3d::Zero();
     double largest_information_m = 0.0;
     double largest_information_rad = 0.0;
@@ -82,6 +86,11 @@ class ChainSolver {
     /// What is known of the delta from here and before.
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    FixBiasEffect bias;  ///< On the mean.
+    /// The fixes of this node leave `kept` of an error of the prediction, and add `by_bias` times
+    /// their bias.
+    Eigen::Matrix3d kept = Eigen::Matrix3d::Identity();
+    Eigen::Matrix3d by_bias = Eigen::Matrix3d::Zero();
     /// delta = offset - gain * delta of the node after, for which it was last taken.
     Eigen::Matrix3d gain = Eigen::Matrix3d::Zero();
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();
@@ -94,6 +103,7 @@ class ChainSolver {
   struct Prediction {
     Eigen::Vector3d mean;
     Eigen::Matrix3d covariance;
+    FixBiasEffect bias;
   };
 
   /// The largest changes of one step.
@@ -102,6 +112,20 @@ class ChainSolver {
     double turn_rad = 0.0;
   };
 
+  /// What the fixes' bias makes of a keyframe's estimate that later fixes have a part in: the error
+  /// is `kept` times that of the filter's mean, and a part that later biases make.
+  struct SmoothedBias {
+    Eigen::Matrix3d kept = Eigen::Matrix3d::Identity();
+    Eigen::Matrix3d later = Eigen::Matrix3d::Zero();  ///< Covariance of the later part.
+    Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  ///< Of it with the bias of this moment.
+
+    [[nodiscard]] Eigen::Matrix3d Covariance(const FixBiasEffect& filtered) const;
+  };
+  /// That of node i, from that of the node after it.
+  [[nodiscard]] SmoothedBias BiasBefore(std::size_t i,
+                                        const SmoothedBias& after,
+                                        const FixWeighting& weighting) const;
+
   void Synchronize(const KeyframeWindow& window);
   void Linearize(KeyframeWindow& window, const FixWeighting& weighting);
   void LinearizeMotion(std::size_t i);
@@ -109,9 +133,12 @@ class ChainSolver {
 
   [[nodiscard]] Prediction FromPrior(const KeyframeWindow& window) const;
   /// What the node before says of node i; keeps in it what leads back.
-  Prediction Predict(std::size_t i);
+  Prediction Predict(std::size_t i, const FixWeighting& weighting);
   void Correct(const Prediction& predicted, double misfit, double damping, Node& node);
-  void Eliminate(const KeyframeWindow& window, double misfit, double damping, std::size_t end);
+  void Eliminate(const KeyframeWindow& window,
+                 const FixWeighting& weighting,
+                 double damping,
+                 std::size_t end);
   Step Substitute(std::size_t first_new);
   void WriteEstimates(KeyframeWindow& window) const;
 

@@ -11,7 +11,7 @@ namespace relocd {
 namespace {
 
 constexpr double kReach = 10.0;  // s; errors were seen to last 3 to 8 s
-constexpr double kUsualMisfit = 8.0;
+constexpr double kUsualMisfit = 16.0;
 /// Fixes that are believed less than this cannot hold an estimate that is wrong, and so pull even
 /// less: the odometry would be followed away from all of them.
 constexpr double kMostMisfit = 30.0;

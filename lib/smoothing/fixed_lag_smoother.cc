@@ -103,9 +103,15 @@ bool IsCertain(const Eigen::Matrix3d& covariance, const SmootherConfig& config) 
          std::sqrt(covariance(2, 2)) <= config.ok_heading_sigma_rad;
 }
 
+FixWeighting WeightingOf(const SmootherConfig& config) {
+  return {config.cauchy_scale_sigmas,
+          config.fix_correlation_time_s,
+          {.sigmas = config.fix_bias_sigmas, .time_s = config.fix_bias_time_s}};
+}
+
 FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
     : config_(config),
-      weighting_(config.cauchy_scale_sigmas, config.fix_correlation_time_s),
+      weighting_(WeightingOf(config)),
       consensus_options_{.radius_sigmas = config.relocalization_radius_sigmas,
                          .min_radius_m = config.relocalization_min_radius_m},
       history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
@@ -139,7 +145,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   voters_.clear();
   window_.last_removed_fix.reset();
   supports_since_start_ = 0;
-  window_.prior = prior;
+  window_.prior = KeyframePrior{.pose = prior};
   newest_covariance_ = prior.covariance;
   if (window_.keyframes.empty()) return {};
   // A keyframe where the body is now: the prior is about this moment.
@@ -151,7 +157,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   }
   while (window_.keyframes.size() > 1)
     RemoveOldest();
-  window_.prior = prior;
+  window_.prior = KeyframePrior{.pose = prior};
   window_.keyframes.front().SetX_WK(prior.X_WB);
   newest_covariance_ = prior.covariance;
   chain_.Invalidate();
@@ -206,7 +212,7 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
 void FixedLagSmoother::Begin(MonotonicTime time) {
   Keyframe keyframe;
   keyframe.time = time;
-  if (window_.prior) keyframe.SetX_WK(window_.prior->X_WB);
+  if (window_.prior) keyframe.SetX_WK(window_.prior->pose.X_WB);
   window_.keyframes.push_back(std::move(keyframe));
   OdometrySample sample;
   sample.time = time;
@@ -519,7 +525,7 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
     drift_.Estimate(window_, newest_covariance_);
   }
   if (chain_.Solve(window_, weighting_, max_iterations)) {
-    newest_covariance_ = chain_.NewestCovariance();
+    newest_covariance_ = chain_.NewestCovariance(weighting_);
     if (IsCovariance(newest_covariance_)) return;
   }
   ++counters_.solver_failures;
@@ -539,7 +545,7 @@ void FixedLagSmoother::RestartAtNewest() {
   chain_.Invalidate();
   newest.fixes = 0;
   newest.gated_fixes = 0;
-  window_.prior = PlanarPose{.X_WB = newest.X_WK(), .covariance = newest_covariance_};
+  window_.prior = KeyframePrior{.pose = {.X_WB = newest.X_WK(), .covariance = newest_covariance_}};
   window_.keyframes.push_back(std::move(newest));
 }
 

@@ -47,6 +47,9 @@ const char* ToString(SmootherStatus status);
 /// Whether a pose's covariance, of the right perturbation, is small enough for the status ok.
 bool IsCertain(const Eigen::Matrix3d& covariance, const SmootherConfig& config);
 
+/// How its fixes are weighted.
+FixWeighting WeightingOf(const SmootherConfig& config);
+
 /// What became of a fix.
 enum class FixOutcome {
   kAccepted,

@@ -79,15 +79,21 @@ AttachedFix* UpdateSharesOfOne(AttachedFix* first,
 void PrepareResidual(AttachedFix& fix) {
   const Eigen::Matrix3d covariance = TotalCovariance(fix);
   fix.sigma_m = std::sqrt(0.5 * covariance.topLeftCorner<2, 2>().trace());
+  const double own_sigma_m = std::sqrt(0.5 * fix.fix.covariance.topLeftCorner<2, 2>().trace());
+  const double heading_sigma_rad = fix.fix.has_heading ? std::sqrt(fix.fix.covariance(2, 2)) : 0.0;
+  fix.bias_scale << own_sigma_m, own_sigma_m, heading_sigma_rad;
   fix.residual = fix.fix.has_heading
                      ? AbsolutePoseResidual::OfPose(fix.fix.X_WB, fix.X_KF, covariance)
                      : AbsolutePoseResidual::OfPosition(
                            fix.fix.X_WB.translation(), fix.X_KF, covariance.topLeftCorner<2, 2>());
 }
 
-FixWeighting::FixWeighting(double cauchy_scale_sigmas, double correlation_time_s)
+FixWeighting::FixWeighting(double cauchy_scale_sigmas,
+                           double correlation_time_s,
+                           const FixBias& bias)
     : cauchy_scale_sigmas_(cauchy_scale_sigmas),
       correlation_time_s_(correlation_time_s),
+      bias_(bias),
       correction_with_heading_(KernelCorrection(cauchy_scale_sigmas, 3)),
       correction_without_heading_(KernelCorrection(cauchy_scale_sigmas, 2)),
       expected_squared_pull_(IntegrateKernel(cauchy_scale_sigmas, 2).squared_pull) {}

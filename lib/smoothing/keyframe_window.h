@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -50,19 +51,37 @@ struct AttachedFix {
   bool is_gated = false;  ///< Kept, but without influence.
   double share = 0.0;     ///< Of it that is news, by UpdateShares.
   double sigma_m = 0.0;   ///< Of its position, the motion from the keyframe included.
+  /// What a bias of one is in it: the sigmas of its own position, in m, and heading, in rad.
+  Eigen::Vector3d bias_scale = Eigen::Vector3d::Zero();
   AbsolutePoseResidual residual;
 };
 
 /// Fills in `residual` and `sigma_m` from the other members.
 void PrepareResidual(AttachedFix& fix);
 
+/// Neighbouring fixes err together by a slowly varying bias: a Gauss-Markov process along W's axes.
+struct FixBias {
+  double sigmas = 0.0;   ///< Its standard deviation, as a part of each fix's own.
+  double time_s = 10.0;  ///< After which 1/e of it is left.
+};
+
+/// The part of an estimate's error that the fixes' bias makes, for a bias of sigma one.
+struct FixBiasEffect {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d cross = Eigen::Matrix3d::Zero();  ///< Covariance with the bias of this moment.
+};
+
 /// How fixes are weighted: by a Cauchy kernel, and by how much they err together.
 class FixWeighting {
  public:
-  FixWeighting(double cauchy_scale_sigmas, double correlation_time_s);
+  FixWeighting(double cauchy_scale_sigmas, double correlation_time_s, const FixBias& bias = {});
 
   [[nodiscard]] double cauchy_scale_sigmas() const { return cauchy_scale_sigmas_; }
   [[nodiscard]] double correlation_time_s() const { return correlation_time_s_; }
+
+  [[nodiscard]] double BiasVariance() const { return bias_.sigmas * bias_.sigmas; }
+  /// The part of a bias that is left after a time.
+  [[nodiscard]] double BiasKept(double seconds) const { return std::exp(-seconds / bias_.time_s); }
 
   /// A fix weighs so many times what its covariance says, before the kernel and the misfit: its
   /// share that is news, and what the kernel takes from good fixes for its own sake alone.
@@ -85,17 +104,24 @@ class FixWeighting {
  private:
   double cauchy_scale_sigmas_;
   double correlation_time_s_;
+  FixBias bias_;
   double correction_with_heading_;
   double correction_without_heading_;
   double expected_squared_pull_;
   double misfit_ = 1.0;
 };
 
+/// What is known of a keyframe from those before it.
+struct KeyframePrior {
+  PlanarPose pose;
+  FixBiasEffect bias = {};  ///< Along W's axes, not part of the pose's covariance.
+};
+
 /// A chain of keyframes with fixes on them, and what is known of its oldest from those before.
 struct KeyframeWindow {
   SlidingVector<Keyframe> keyframes;
   SlidingVector<AttachedFix> fixes;               ///< By time.
-  std::optional<PlanarPose> prior;                ///< Of the oldest keyframe.
+  std::optional<KeyframePrior> prior;             ///< Of the oldest keyframe.
   std::optional<MonotonicTime> last_removed_fix;  ///< The next one may be correlated with it.
 
   [[nodiscard]] bool Has(std::int64_t keyframe_id) const;

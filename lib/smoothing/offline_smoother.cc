@@ -232,7 +232,7 @@ std::vector<SmootherEstimate> SmoothAll(const MotionLog& log, const SmootherConf
   for (AttachedFix& fix : all.fixes)
     fix.is_gated = false;
   UpdateAllShares(all, config.fix_correlation_time_s);
-  FixWeighting weighting(config.cauchy_scale_sigmas, config.fix_correlation_time_s);
+  FixWeighting weighting = WeightingOf(config);
   const ConsensusOptions consensus_options{.radius_sigmas = config.relocalization_radius_sigmas,
                                            .min_radius_m = config.relocalization_min_radius_m};
   FixMisfit misfit;

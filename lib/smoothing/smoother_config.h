@@ -50,7 +50,9 @@ struct SmootherConfig {
 
   double cauchy_scale_sigmas = 1.0;
   double gate_squared_mahalanobis = 100.0;
-  double fix_correlation_time_s = 1.0;
+  double fix_correlation_time_s = 0.2;
+  double fix_bias_sigmas = 0.5;
+  double fix_bias_time_s = 10.0;
   int max_fixes_per_keyframe = 8;
   double max_fix_age_s = 10.0;
   double max_extrapolation_s = 0.5;
@@ -125,6 +127,11 @@ struct SmootherConfig {
     visit("fix_correlation_time_s",
           self.fix_correlation_time_s,
           ">= 0; fixes closer than this share the information of one");
+    visit("fix_bias_sigmas",
+          self.fix_bias_sigmas,
+          ">= 0; of a slowly varying part of the fixes' errors, as a part of their own sigmas: the "
+          "reported covariance allows for it");
+    visit("fix_bias_time_s", self.fix_bias_time_s, "> 0; after which 1/e of it is left");
     visit("max_fixes_per_keyframe",
           self.max_fixes_per_keyframe,
           "[1, 1000]; further ones of the same place are not used: they add no information");

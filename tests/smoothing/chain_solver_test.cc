@@ -135,51 +135,88 @@ TEST(ChainSolverTest, FindsTheRobustMinimumWhenItMayIterate) {
   }
 }
 
-/// The normal equations of a window, set up and inverted as a whole: covariances of right
-/// perturbations.
-std::vector<Eigen::Matrix3d> DenseCovariances(KeyframeWindow& window) {
+/// Fixes that err by a bias as well, of half their sigmas, that changes within some seconds.
+const FixWeighting kBiased(1e6, 0.0, {.sigmas = 0.5, .time_s = 4.0});
+
+/// The normal equations of a window, set up as a whole: the information, and by how much a bias of
+/// each keyframe's fixes moves the right-hand side.
+struct DenseEquations {
+  Eigen::MatrixXd information;
+  Eigen::MatrixXd rhs_by_bias;
+};
+
+DenseEquations SetUpDense(KeyframeWindow& window) {
   const auto size = static_cast<Eigen::Index>(3 * window.keyframes.size());
-  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(size, size);
+  DenseEquations dense{Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, size)};
   const auto prior =
-      AbsolutePoseResidual::OfPose(window.prior->X_WB, Pose2(), window.prior->covariance);
-  hessian.topLeftCorner<3, 3>() += prior.information();
+      AbsolutePoseResidual::OfPose(window.prior->pose.X_WB, Pose2(), window.prior->pose.covariance);
+  dense.information.topLeftCorner<3, 3>() += prior.information();
   for (Eigen::Index i = 3; i < size; i += 3) {
     const Keyframe& keyframe = window.keyframes[static_cast<std::size_t>(i / 3)];
     const RelativePoseResidual residual = keyframe.MotionResidual();
     const auto at = residual.Linearize(window.Get(keyframe.id - 1).x_WK, keyframe.x_WK);
     Eigen::Matrix<double, 3, 6> jacobian;
     jacobian << at.by_A, at.by_B;
-    hessian.block<6, 6>(i - 3, i - 3) +=
+    dense.information.block<6, 6>(i - 3, i - 3) +=
         jacobian.transpose() * residual.covariance().inverse() * jacobian;
   }
   for (const AttachedFix& fix : window.fixes) {
     const Eigen::Matrix3d jacobian = fix.residual.Linearize(window.Get(fix.keyframe_id).x_WK).by_K;
+    const Eigen::Matrix3d gradient =
+        kQuadratic.BaseWeight(fix) * jacobian.transpose() * fix.residual.information();
     const auto i = static_cast<Eigen::Index>(3 * fix.keyframe_id);
-    hessian.block<3, 3>(i, i) +=
-        kQuadratic.BaseWeight(fix) * jacobian.transpose() * fix.residual.information() * jacobian;
+    dense.information.block<3, 3>(i, i) += gradient * jacobian;
+    dense.rhs_by_bias.block<3, 3>(i, i) += gradient * fix.bias_scale.asDiagonal();
   }
-  const Eigen::MatrixXd inverse = hessian.inverse();
+  return dense;
+}
+
+/// The biases' covariance with each other, keyframe by keyframe.
+Eigen::MatrixXd BiasCovariance(const KeyframeWindow& window, const FixWeighting& weighting) {
+  const auto size = static_cast<Eigen::Index>(3 * window.keyframes.size());
+  Eigen::MatrixXd covariance(size, size);
+  for (const Keyframe& a : window.keyframes) {
+    for (const Keyframe& b : window.keyframes) {
+      const double seconds = std::abs(ToSeconds(a.time - b.time));
+      covariance.block<3, 3>(static_cast<Eigen::Index>(3 * a.id),
+                             static_cast<Eigen::Index>(3 * b.id)) =
+          weighting.BiasVariance() * weighting.BiasKept(seconds) * Eigen::Matrix3d::Identity();
+    }
+  }
+  return covariance;
+}
+
+/// The covariances of right perturbations, from the whole window's equations.
+std::vector<Eigen::Matrix3d> DenseCovariances(KeyframeWindow& window,
+                                              const FixWeighting& weighting) {
+  const DenseEquations dense = SetUpDense(window);
+  const Eigen::MatrixXd inverse = dense.information.inverse();
+  const Eigen::MatrixXd by_bias = inverse * dense.rhs_by_bias;
+  const Eigen::MatrixXd all =
+      inverse + by_bias * BiasCovariance(window, weighting) * by_bias.transpose();
   std::vector<Eigen::Matrix3d> covariances;
   for (const Keyframe& keyframe : window.keyframes) {
     Eigen::Matrix3d R_KW = Eigen::Matrix3d::Identity();
     R_KW.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(-keyframe.x_WK.z()).toRotationMatrix();
     const auto i = static_cast<Eigen::Index>(3 * keyframe.id);
-    covariances.emplace_back(R_KW * inverse.block<3, 3>(i, i) * R_KW.transpose());
+    covariances.emplace_back(R_KW * all.block<3, 3>(i, i) * R_KW.transpose());
   }
   return covariances;
 }
 
 TEST(ChainSolverTest, CovariancesAreThoseOfTheWholeNormalEquations) {
-  KeyframeWindow window = MakeBentWindow(20, 1);
-  ChainSolver chain(20);
-  ASSERT_TRUE(chain.Solve(window, kQuadratic, 50));
-  const std::vector<Eigen::Matrix3d> expected = DenseCovariances(window);
-  // The equations are set up where the last step began, or a keyframe turned by a milliradian.
-  const double tolerance = 5e-3 * expected.back().diagonal().maxCoeff();
-  EXPECT_THAT(chain.NewestCovariance(), IsNear(expected.back(), tolerance));
-  const std::vector<Eigen::Matrix3d> smoothed = chain.SmoothedCovariances(window, kQuadratic);
-  for (std::size_t i = 0; i < expected.size(); ++i)
-    EXPECT_THAT(smoothed[i], IsNear(expected[i], tolerance)) << "keyframe " << i;
+  for (const FixWeighting& weighting : {kQuadratic, kBiased}) {
+    KeyframeWindow window = MakeBentWindow(20, 1);
+    ChainSolver chain(20);
+    ASSERT_TRUE(chain.Solve(window, weighting, 50));
+    const std::vector<Eigen::Matrix3d> expected = DenseCovariances(window, weighting);
+    // The equations are set up where the last step began, or a keyframe turned by a milliradian.
+    const double tolerance = 5e-3 * expected.back().diagonal().maxCoeff();
+    EXPECT_THAT(chain.NewestCovariance(weighting), IsNear(expected.back(), tolerance));
+    const std::vector<Eigen::Matrix3d> smoothed = chain.SmoothedCovariances(window, weighting);
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      EXPECT_THAT(smoothed[i], IsNear(expected[i], tolerance)) << "keyframe " << i;
+  }
 }
 
 TEST(ChainSolverTest, MarginalizingChangesNeitherEstimateNorCovariance) {
@@ -187,16 +224,16 @@ TEST(ChainSolverTest, MarginalizingChangesNeitherEstimateNorCovariance) {
   KeyframeWindow shortened = MakeBentWindow(30, 2);
   ChainSolver chain(30);
   ChainSolver other(30);
-  ASSERT_TRUE(chain.Solve(whole, kQuadratic, 50));
-  ASSERT_TRUE(other.Solve(shortened, kQuadratic, 50));
+  ASSERT_TRUE(chain.Solve(whole, kBiased, 50));
+  ASSERT_TRUE(other.Solve(shortened, kBiased, 50));
   for (int i = 0; i < 20; ++i)
-    other.MarginalizeOldest(shortened, kQuadratic);
+    other.MarginalizeOldest(shortened, kBiased);
   EXPECT_EQ(shortened.keyframes.size(), 10U);
   EXPECT_EQ(shortened.fixes.front().keyframe_id, 21);
   other.Invalidate();
-  ASSERT_TRUE(other.Solve(shortened, kQuadratic, 50));
+  ASSERT_TRUE(other.Solve(shortened, kBiased, 50));
   EXPECT_LT(LargestDifference(shortened, whole), 1e-4);
-  EXPECT_THAT(other.NewestCovariance(), IsNear(chain.NewestCovariance(), 5e-5));
+  EXPECT_THAT(other.NewestCovariance(kBiased), IsNear(chain.NewestCovariance(kBiased), 5e-5));
 }
 
 /// A stiff chain that is held by weak fixes alone: what a rigid shift costs is small beside what

@@ -58,16 +58,15 @@ struct Honesty {
   double nees_per_dof = 0.0;
 };
 
-Honesty MeasureHonesty(bool has_heading) {
+Honesty MeasureHonesty(const DriveOptions& options, const SmootherConfig& config) {
   constexpr unsigned kDrives = 10;
   constexpr std::size_t kFirst = 50;
   int inside = 0;
   int count = 0;
   double nees = 0.0;
   for (unsigned seed = 0; seed < kDrives; ++seed) {
-    const auto drive =
-        DriveSimulator({.duration_s = 160.0, .has_heading = has_heading}, seed).Run();
-    const auto estimates = SmoothCausally(drive.log, ConfigForIndependentErrors());
+    const auto drive = DriveSimulator(options, seed).Run();
+    const auto estimates = SmoothCausally(drive.log, config);
     for (std::size_t i = kFirst; i < estimates.size(); ++i) {
       const Eigen::Vector3d error = (estimates[i].X_WB.Inverse() * drive.truth_at_fixes[i]).Log();
       const Eigen::Matrix3d& covariance = estimates[i].covariance;
@@ -83,7 +82,8 @@ Honesty MeasureHonesty(bool has_heading) {
 TEST(FixedLagSmootherTest, ReportsACovarianceThatTheTruthLiesIn) {
   if (kIsSlowBuild) GTEST_SKIP() << "3,200 solutions take minutes under a sanitizer";
   for (const bool has_heading : {true, false}) {
-    const Honesty honesty = MeasureHonesty(has_heading);
+    const Honesty honesty = MeasureHonesty({.duration_s = 160.0, .has_heading = has_heading},
+                                           ConfigForIndependentErrors());
     std::cout << (has_heading ? "poses" : "positions") << ": truth in the 95 % ellipse "
               << 100.0 * honesty.share_in_ellipse95 << " %, NEES per degree of freedom "
               << honesty.nees_per_dof << '\n';
@@ -92,6 +92,22 @@ TEST(FixedLagSmootherTest, ReportsACovarianceThatTheTruthLiesIn) {
     EXPECT_GT(honesty.nees_per_dof, 0.5);
     EXPECT_LT(honesty.nees_per_dof, 1.3);
   }
+}
+
+TEST(FixedLagSmootherTest, AllowsForFixesThatErrTogether) {
+  if (kIsSlowBuild) GTEST_SKIP() << "thousands of solutions take minutes under a sanitizer";
+  const DriveOptions options{
+      .duration_s = 160.0, .fix_rate_hz = 5.0, .has_heading = false, .bias_sigmas = 0.8};
+  SmootherConfig config = ConfigForIndependentErrors();
+  const Honesty as_if_independent = MeasureHonesty(options, config);
+  config.fix_bias_sigmas = 0.8;
+  const Honesty biased = MeasureHonesty(options, config);
+  std::cout << "fixes that err together: truth in the 95 % ellipse "
+            << 100.0 * biased.share_in_ellipse95 << " %, not allowed for "
+            << 100.0 * as_if_independent.share_in_ellipse95 << " %\n";
+  EXPECT_LT(as_if_independent.share_in_ellipse95, 0.85);
+  EXPECT_GT(biased.share_in_ellipse95, 0.90);
+  EXPECT_LT(biased.share_in_ellipse95, 0.995);  // the misfit sees a part of the bias as well
 }
 
 TEST(FixedLagSmootherTest, BeatsTheFixes) {

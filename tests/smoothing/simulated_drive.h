@@ -23,6 +23,8 @@ struct DriveOptions {
   double fix_heading_sigma_rad = 0.03;
   double outlier_share = 0.0;
   bool has_heading = true;
+  double bias_sigmas = 0.0;  ///< Of a part of the fixes' errors that lasts, in their sigmas.
+  double bias_time_s = 10.0;
   Pose2 X_WB0{10.0, -20.0, 0.5};
 };
 
@@ -76,7 +78,9 @@ class DriveSimulator {
     const Eigen::Vector3d sigmas(
         options_.fix_sigma_m, options_.fix_sigma_m, options_.fix_heading_sigma_rad);
     fix.covariance = sigmas.cwiseAbs2().asDiagonal();
-    fix.X_WB = X_WB * Pose2::Exp(Draw(fix.covariance));
+    const Pose2 X_WM = X_WB * Pose2::Exp(Draw(fix.covariance));
+    const Eigen::Vector3d bias = NextBias().cwiseProduct(sigmas);
+    fix.X_WB = Pose2(X_WM.x() + bias.x(), X_WM.y() + bias.y(), X_WM.yaw() + bias.z());
     if (uniform_(engine_) < options_.outlier_share) {
       constexpr double kReach = 100.0;
       fix.X_WB = Pose2(X_WB.x() + kReach * (2.0 * uniform_(engine_) - 1.0),
@@ -87,16 +91,28 @@ class DriveSimulator {
   }
 
  private:
+  /// A Gauss-Markov process, from one fix to the next.
+  Eigen::Vector3d NextBias() {
+    if (options_.bias_sigmas <= 0.0) return Eigen::Vector3d::Zero();
+    const double kept = std::exp(-1.0 / (options_.fix_rate_hz * options_.bias_time_s));
+    const double variance = options_.bias_sigmas * options_.bias_sigmas;
+    bias_ = kept * bias_ + Draw(variance * (1.0 - kept * kept) * Eigen::Matrix3d::Identity());
+    return bias_;
+  }
+
   DriveOptions options_;
   std::mt19937 engine_;
+  Eigen::Vector3d bias_ = Eigen::Vector3d::Zero();
   std::normal_distribution<double> normal_{0.0, 1.0};
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
 };
 
-/// The simulation's odometry errs independently from step to step, as its covariances say.
+/// The simulation's odometry errs independently from step to step, as its covariances say, and so
+/// do its fixes without a bias.
 inline SmootherConfig ConfigForIndependentErrors() {
   SmootherConfig config;
   config.odometry_covariance_factor = 1.0;
+  config.fix_bias_sigmas = 0.0;
   return config;
 }
 
