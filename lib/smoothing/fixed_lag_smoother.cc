@@ -30,6 +30,8 @@ constexpr std::size_t kFewestVoters = 8;
 /// Whether the fixes contradict the estimate is seen from the last so many.
 constexpr std::size_t kLostVoters = 10;
 constexpr double kLostShare = 0.2;
+/// A fix within so many squared standard deviations of where it was predicted agrees with the pose.
+constexpr double kAgreement = 9.0;
 /// Below these a body that stands is not more certain: the minimum keeps the matrix regular.
 const Eigen::Vector3d kLeastSigmas(1e-3, 1e-3, 1e-4);
 /// Variance of an angle of which nothing is known.
@@ -144,7 +146,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   chain_.Invalidate();
   voters_.clear();
   window_.last_removed_fix.reset();
-  supports_since_start_ = 0;
+  agreements_since_start_ = 0;
   window_.prior = KeyframePrior{.pose = prior};
   newest_covariance_ = prior.covariance;
   if (window_.keyframes.empty()) return {};
@@ -188,6 +190,7 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
                              step.X_BprevB.yaw())};
   }
   const Pose2 X_BprevB = drift_.Correct(step.X_BprevB);
+  newest_motion_ = X_BprevB;
   OdometrySample sample = history_.newest();
   sample.time = step.time;
   sample.X_OB = sample.X_OB * X_BprevB;
@@ -299,7 +302,7 @@ void FixedLagSmoother::NoteFixesChanged(std::int64_t keyframe_id) {
                       UpdateShares(window_, config_.fix_correlation_time_s, keyframe_id));
 }
 
-bool FixedLagSmoother::PassesGate(const AttachedFix& fix) const {
+double FixedLagSmoother::SquaredInnovation(const AttachedFix& fix) const {
   const Pose2 X_WF = window_.X_WF(fix);
   const Pose2& X_WM = fix.fix.X_WB;
   const Eigen::Matrix3d predicted =
@@ -309,13 +312,13 @@ bool FixedLagSmoother::PassesGate(const AttachedFix& fix) const {
   if (!fix.fix.has_heading) {
     const Eigen::Matrix2d innovation = R_WF * predicted.topLeftCorner<2, 2>() * R_WF.transpose() +
                                        fix.fix.covariance.topLeftCorner<2, 2>();
-    return SquaredMahalanobis(error_W, innovation) <= config_.gate_squared_mahalanobis;
+    return SquaredMahalanobis(error_W, innovation);
   }
   // Both along F's axes: they differ from the measured ones by the heading's error.
   Eigen::Vector3d error;
   error << R_WF.transpose() * error_W, WrapAngle(X_WM.yaw() - X_WF.yaw());
   const Eigen::Matrix3d innovation = predicted + fix.fix.covariance;
-  return SquaredMahalanobis(error, innovation) <= config_.gate_squared_mahalanobis;
+  return SquaredMahalanobis(error, innovation);
 }
 
 FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
@@ -337,7 +340,7 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
     ++counters_.fixes_late;
     return FixOutcome::kLate;
   }
-  Remember(fix, *sample);
+  const bool is_voter = Remember(fix, *sample);
   AttachedFix attached = Attach(fix, *sample);
   if (!is_started_) {
     if (!unstarted_fix_ || fix.time > unstarted_fix_->time) unstarted_fix_ = fix;
@@ -350,7 +353,9 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
     return FixOutcome::kAccepted;
   }
 
-  attached.is_gated = !PassesGate(attached);
+  const double squared_innovation = SquaredInnovation(attached);
+  attached.is_gated = squared_innovation > config_.gate_squared_mahalanobis;
+  if (is_voter && squared_innovation <= kAgreement) ++agreements_since_start_;
   const Keyframe& keyframe = window_.Get(sample->keyframe_id);
   const bool is_full =
       (attached.is_gated ? keyframe.gated_fixes : keyframe.fixes) >= config_.max_fixes_per_keyframe;
@@ -377,17 +382,16 @@ void FixedLagSmoother::NoteSupport(const OdometrySample& sample) {
     last_support_ = sample.time;
     odometer_at_fix_m_ = odometer_m_;
   }
-  ++supports_since_start_;
 }
 
-void FixedLagSmoother::Remember(const Fix& fix, const OdometrySample& sample) {
+bool FixedLagSmoother::Remember(const Fix& fix, const OdometrySample& sample) {
   const auto after = std::upper_bound(
       voters_.begin(), voters_.end(), fix.time, [](MonotonicTime time, const Voter& voter) {
         return time < voter.time;
       });
   const Duration spacing = FromSeconds(config_.relocalization_spacing_s);
-  if (after != voters_.begin() && fix.time - std::prev(after)->time < spacing) return;
-  if (after != voters_.end() && after->time - fix.time < spacing) return;
+  if (after != voters_.begin() && fix.time - std::prev(after)->time < spacing) return false;
+  if (after != voters_.end() && after->time - fix.time < spacing) return false;
   Voter voter;
   voter.time = fix.time;
   voter.keyframe_id = sample.keyframe_id;
@@ -397,6 +401,7 @@ void FixedLagSmoother::Remember(const Fix& fix, const OdometrySample& sample) {
   if (voters_.size() > static_cast<std::size_t>(config_.relocalization_window)) {
     voters_.erase(voters_.begin());
   }
+  return true;
 }
 
 Pose2 FixedLagSmoother::X_WO() const {
@@ -422,7 +427,7 @@ void FixedLagSmoother::TryStart() {
     return;
   }
   is_started_ = true;
-  supports_since_start_ = consensus->supporters;
+  agreements_since_start_ = 0;
   Reseed(consensus->X_WO);
 }
 
@@ -474,7 +479,7 @@ bool FixedLagSmoother::TryRelocalize() {
   const auto consensus = FindConsensus(fixes, consensus_options_);
   if (!consensus || consensus->supporters < needed) return false;
   ++counters_.relocalizations;
-  supports_since_start_ = consensus->supporters;
+  agreements_since_start_ = 0;
   Relocalize(consensus->X_WO, fixes);
   return true;
 }
@@ -596,7 +601,7 @@ SmootherStatus FixedLagSmoother::Status(const Eigen::Matrix3d& covariance,
   if (!last_support_ || ToSeconds(now - *last_support_) > config_.dead_reckoning_after_s) {
     return SmootherStatus::kDeadReckoning;
   }
-  if (supports_since_start_ < config_.ok_fixes || !IsCertain(covariance, config_)) {
+  if (agreements_since_start_ < config_.ok_fixes || !IsCertain(covariance, config_)) {
     return SmootherStatus::kConverging;
   }
   return SmootherStatus::kOk;

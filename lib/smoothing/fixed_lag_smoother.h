@@ -112,6 +112,9 @@ class FixedLagSmoother {
   /// then counted and without effect.
   Result<void> AddOdometry(const OdometryStep& step);
 
+  /// The motion of the last step of odometry, with what it gets wrong all the time put right.
+  [[nodiscard]] const Pose2& newest_motion() const { return newest_motion_; }
+
   FixOutcome AddFix(const Fix& fix);
 
   [[nodiscard]] SmootherEstimate Estimate() const;
@@ -136,8 +139,9 @@ class FixedLagSmoother {
   [[nodiscard]] AttachedFix Attach(const Fix& fix, const OdometrySample& sample) const;
   void Insert(AttachedFix fix);
   void NoteFixesChanged(std::int64_t keyframe_id);
-  [[nodiscard]] bool PassesGate(const AttachedFix& fix) const;
-  void Remember(const Fix& fix, const OdometrySample& sample);
+  [[nodiscard]] double SquaredInnovation(const AttachedFix& fix) const;
+  /// @return whether it is one more voter: not right beside another in time.
+  bool Remember(const Fix& fix, const OdometrySample& sample);
   void NoteSupport(const OdometrySample& sample);
 
   void TryStart();
@@ -179,12 +183,13 @@ class FixedLagSmoother {
   Eigen::Matrix3d newest_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the newest keyframe.
   std::vector<Voter> voters_;                                    ///< By time, the newest last.
 
+  Pose2 newest_motion_;
   bool is_started_ = false;
   std::optional<Fix> unstarted_fix_;  ///< The newest, for a first position.
   double odometer_m_ = 0.0;
   double odometer_at_fix_m_ = 0.0;
   std::optional<MonotonicTime> last_support_;
-  std::int64_t supports_since_start_ = 0;
+  std::int64_t agreements_since_start_ = 0;  ///< Fixes that lay where they were predicted.
 };
 
 }  // namespace relocd

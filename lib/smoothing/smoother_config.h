@@ -169,7 +169,11 @@ struct SmootherConfig {
 
   template <typename Self, typename Visitor>
   static void VisitStatusFields(Self& self, Visitor& visit) {
-    visit("ok_fixes", self.ok_fixes, "[1, 1000]; that support the pose before the status is ok");
+    visit(
+        "ok_fixes",
+        self.ok_fixes,
+        "[1, 1000]; that lie where the pose predicted them, relocalization_spacing_s apart, before "
+        "the status is ok");
     visit("ok_sigma_m", self.ok_sigma_m, "> 0; largest position sigma for the status ok");
     visit("ok_heading_sigma_rad",
           self.ok_heading_sigma_rad,
