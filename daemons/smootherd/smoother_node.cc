@@ -30,8 +30,10 @@ constexpr double kAngularAccelerationSigma = 1.0;  // rad/s^2
 constexpr double kLongestCoast = 1.0;  // s
 /// A body more tilted than this has no heading on the map: the camera pose must be wrong.
 constexpr double kLeastUprightness = 0.5;  // the cosine of 60 degrees
-/// MAP_TO_ODOM is published when it moved by more.
-constexpr double kLeastMove = 1e-6;
+/// MAP_TO_ODOM is published when the last one would put the body this far from where it is: the
+/// odometry's constant errors, which are put right in the pose, turn it slowly all the time.
+constexpr double kLeastMove = 5e-3;  // m
+constexpr double kLeastTurn = 1e-3;  // rad
 /// So many messages in a row that are older than the newest one, but rise: the clock has jumped
 /// back.
 constexpr int kOldAreNew = 100;
@@ -94,7 +96,7 @@ void SmootherNode::Handle(const odometry_t& message) {
       ++counters_.odometry_refused;
       return;
     }
-    step_since_published_ = step.X_BprevB;
+    step_since_published_ = smoother_.newest_motion();
   }
   last_odometry_ = message;
   const SmootherEstimate estimate = smoother_.Estimate();
@@ -357,8 +359,8 @@ void SmootherNode::PublishMapToOdom(std::int64_t utime, const SmootherEstimate& 
   if (estimate.status == SmootherStatus::kUninitialised) return;
   const Pose2 X_WO = estimate.X_WB * X_OBOf(*last_odometry_).Inverse();
   if (published_WO_) {
-    const Pose2 move = published_WO_->Inverse() * X_WO;
-    if (move.translation().norm() <= kLeastMove && std::abs(move.yaw()) <= kLeastMove) return;
+    const Pose2 move = (*published_WO_ * X_OBOf(*last_odometry_)).Inverse() * estimate.X_WB;
+    if (move.translation().norm() <= kLeastMove && std::abs(move.yaw()) <= kLeastTurn) return;
   }
   published_WO_ = X_WO;
   rigid_transform_t transform{};

@@ -194,8 +194,25 @@ TEST_F(SmootherNodeTest, MapToOdomTakesTheOdometrysPoseToTheMaps) {
   ASSERT_FALSE(transforms_.empty());
   const rigid_transform_t& last = transforms_.back();
   const Pose2 X_WO(last.trans[0], last.trans[1], 2.0 * std::atan2(last.quat[3], last.quat[0]));
-  EXPECT_LT(((X_WO * X_OB_).translation() - LastPose().translation()).norm(), 1e-9);
-  EXPECT_LE(transforms_.size(), localizations_.size());  // the drift that is put right moves O
+  EXPECT_LT(((X_WO * X_OB_).translation() - LastPose().translation()).norm(), 5e-3);
+  // Once for a fix that moved it, and seldom for the odometry's drift that is put right.
+  EXPECT_LE(transforms_.size(), 60U);
+  EXPECT_GT(localizations_.size(), 900U);
+}
+
+TEST_F(SmootherNodeTest, WithoutAFixNothingJumps) {
+  DriveFor(20.0);
+  node_->Handle(Drive());  // takes up the last fix
+  bus_.HandlePending();
+  const std::size_t before = localizations_.size();
+  for (int i = 0; i < 100; ++i)
+    node_->Handle(Drive(i % 10 == 0 ? 3 : 0));
+  bus_.HandlePending();
+  ASSERT_EQ(localizations_.size(), before + 100);
+  for (std::size_t i = before; i < localizations_.size(); ++i) {
+    EXPECT_LT(localizations_[i].jump_m, 1e-9) << i;
+    EXPECT_LT(localizations_[i].jump_rad, 1e-9) << i;
+  }
 }
 
 TEST_F(SmootherNodeTest, AFixPublishesNothingByItselfAndIsInTheNextPose) {
@@ -209,7 +226,7 @@ TEST_F(SmootherNodeTest, AFixPublishesNothingByItselfAndIsInTheNextPose) {
   const std::int64_t fix_seq = fix_seq_ - 1;
   node_->Handle(Drive());
   bus_.HandlePending();
-  EXPECT_EQ(poses_.size() + localizations_.size() + transforms_.size(), before + 3);
+  EXPECT_GE(poses_.size() + localizations_.size() + transforms_.size(), before + 2);
   EXPECT_EQ(localizations_.back().last_fix_seq, fix_seq);
 }
 
@@ -219,7 +236,7 @@ TEST_F(SmootherNodeTest, ALostMessageIsBridged) {
   node_->Handle(Drive(10));
   bus_.HandlePending();
   EXPECT_LT(PositionError(), 0.2);
-  EXPECT_LT(localizations_.back().jump_m, 2e-3);
+  EXPECT_LT(localizations_.back().jump_m, 1e-9);
   EXPECT_EQ(node_->counters().odometry_bridged, 1);
 }
 
@@ -255,7 +272,7 @@ TEST_F(SmootherNodeTest, ThePoseGoesOnWhenOdometryRestarts) {
   node_->Handle(Drive());
   bus_.HandlePending();
   EXPECT_LT(PositionError(), 0.4);
-  EXPECT_LT(localizations_.back().jump_m, 2e-3);
+  EXPECT_LT(localizations_.back().jump_m, 1e-9);
   EXPECT_GT(std::sqrt(localizations_.back().covariance[0]), sigma_before + 0.05);
   EXPECT_EQ(node_->counters().odometry_restarts, 1);
   DriveFor(20.0);
