@@ -271,7 +271,11 @@ Finding CheckCamera(const std::string& camera, const CameraConfig& config, Syste
     if (probes.Exists(config.file.dataset)) return Ok(name, "plays " + config.file.dataset);
     return Problem(name, config.file.dataset + " is not there", "ls " + config.file.dataset);
   }
-  if (probes.Exists(config.device)) return Ok(name, config.device + " is there");
+  if (probes.Exists(config.device)) {
+    // Who may not open it reads that elsewhere: this line is about the camera.
+    const auto offer = probes.DescribeCamera(config);
+    return Ok(name, offer ? config.device + ": " + *offer : config.device + " is there");
+  }
   return Problem(name,
                  config.device + " is not there",
                  fmt::format("ls -l /dev/v4l/by-id /dev/video*  # plug it in, or set "

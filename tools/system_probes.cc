@@ -15,6 +15,8 @@
 #include <fmt/format.h>
 #include <spawn.h>
 
+#include "camera/v4l2_description.h"
+#include "camera/v4l2_system.h"
 #include "core/file.h"
 #include "core/time.h"
 #include "core/unique_fd.h"
@@ -117,6 +119,11 @@ Result<SystemProbes::MapCamera> ThisMachine::ReadMapCamera(const std::string& pa
   auto map = ReadMap(path);
   if (!map) return std::move(map).error();
   return MapCamera{.width = map->camera.width, .height = map->camera.height};
+}
+
+Result<std::string> ThisMachine::DescribeCamera(const CameraConfig& config) {
+  KernelV4l2System kernel;
+  return relocd::DescribeCamera(kernel, config);
 }
 
 }  // namespace relocd

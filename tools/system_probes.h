@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "camera/camera_config.h"
 #include "core/result.h"
 
 namespace relocd {
@@ -38,6 +39,8 @@ class SystemProbes {
   /// Whether the kernel's wall clock is kept by a time server.
   [[nodiscard]] virtual bool IsClockSynchronized() = 0;
   [[nodiscard]] virtual Result<MapCamera> ReadMapCamera(const std::string& path) = 0;
+  /// What a V4L2 camera offers.
+  [[nodiscard]] virtual Result<std::string> DescribeCamera(const CameraConfig& config) = 0;
 };
 
 /// This machine.
@@ -50,6 +53,7 @@ class ThisMachine final : public SystemProbes {
   Result<void> LoopBack(const std::string& lcm_url) override;
   bool IsClockSynchronized() override;
   Result<MapCamera> ReadMapCamera(const std::string& path) override;
+  Result<std::string> DescribeCamera(const CameraConfig& config) override;
 };
 
 }  // namespace relocd

@@ -60,6 +60,7 @@ NodeStatus CameraNode::Status(const ClockReading& now) const {
   if (!source_.problem().empty()) {
     status.Raise(status_t::ERROR, "no frames: " + source_.problem());
   }
+  if (!source_.remark().empty()) status.Raise(status_t::WARNING, source_.remark());
   if (!publish_error_.empty()) status.Raise(status_t::ERROR, publish_error_);
   const bool is_other_size = width_ != config_.width || height_ != config_.height;
   if (config_.driver == "v4l2" && seq_ > 0 && is_other_size) {

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "camera/config_checks.h"
 #include "camera/jpeg.h"
 #include "core/index_range.h"
 
@@ -15,22 +16,6 @@ namespace {
 constexpr int kMinImageSide = 16;
 constexpr double kMillisecondsPerSecond = 1e3;
 constexpr double kMinFramesInTimeout = 3.0;
-
-template <typename Number>
-Result<void> CheckRange(std::string_view field, Number value, Number low, Number high) {
-  if (value >= low && value <= high) return {};  // false for NaN
-  return Error{ErrorKind::kInvalidInput,
-               fmt::format("{} is {}, must be in [{}, {}]", field, value, low, high)};
-}
-
-template <typename... Names>
-Result<void> CheckOneOf(std::string_view field, const std::string& value, Names... names) {
-  if (((value == names) || ...)) return {};
-  std::string allowed;
-  ((allowed += allowed.empty() ? names : std::string(", ") + names), ...);
-  return Error{ErrorKind::kInvalidInput,
-               fmt::format("{} is '{}', must be one of {}", field, value, allowed)};
-}
 
 Result<void> CheckMounting(const CameraConfig& config) {
   constexpr double kFarthest = 100.0;
@@ -93,6 +78,9 @@ Result<void> CameraConfig::Validate() const {
   if (auto ok = CheckOneOf("pixel_format", pixel_format, "MJPG", "YUYV", "GREY"); !ok) return ok;
   if (auto ok = CheckRange("jpeg_quality", jpeg_quality, 1, 100); !ok) return ok;
   if (auto ok = CheckRange("max_jpeg_bytes", max_jpeg_bytes, 1000, 10'000'000); !ok) return ok;
+  if (auto ok = controls.Validate(); !ok) {
+    return Error{ok.error().kind, "controls." + ok.error().message};
+  }
   return CheckTimes(*this);
 }
 

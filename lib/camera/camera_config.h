@@ -4,6 +4,7 @@
 #include <numbers>
 #include <string>
 
+#include "camera/camera_controls_config.h"
 #include "core/result.h"
 #include "geometry/pose3.h"
 
@@ -43,6 +44,7 @@ struct CameraConfig {
   int max_jpeg_bytes = 60'000;
   int no_frame_timeout_ms = 1000;
   double time_offset_ms = 0.0;
+  CameraControlsConfig controls;
   std::array<double, 3> X_BC_translation_m{};
   std::array<double, 3> X_BC_roll_pitch_yaw_rad{
       -std::numbers::pi / 2.0, 0.0, -std::numbers::pi / 2.0};
@@ -70,6 +72,8 @@ struct CameraConfig {
     visit("time_offset_ms",
           self.time_offset_ms,
           "[-1000, 1000]; v4l2: added to the driver's time to reach the middle of the exposure");
+    visit(
+        "controls", self.controls, "v4l2: set each time that the camera is opened, and read back");
     visit("X_BC_translation_m",
           self.X_BC_translation_m,
           "[-100, 100]; the camera in the body frame: x forward, y left, z up from the ground");

@@ -89,6 +89,9 @@ class FrameSource {
   /// Why no frames come; empty while they do.
   [[nodiscard]] const std::string& problem() const { return problem_; }
 
+  /// What is otherwise than the config asks, although frames come; empty when nothing is.
+  [[nodiscard]] const std::string& remark() const { return remark_; }
+
   /// What an operator should read of since the last call: a camera lost or found, a file that is
   /// damaged. Each change once, not each event.
   std::vector<std::string> TakeNotices() { return std::exchange(notices_, {}); }
@@ -96,6 +99,7 @@ class FrameSource {
  protected:
   FrameCounters counters_;
   std::string problem_;
+  std::string remark_;
   std::vector<std::string> notices_;
 };
 

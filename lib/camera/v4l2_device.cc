@@ -14,14 +14,14 @@
 #include <fmt/format.h>
 
 #include "camera/frame_source.h"
+#include "camera/v4l2_frame_rates.h"
 #include "core/file.h"
 
 namespace relocd {
 namespace {
 
 constexpr std::uint32_t kBufferCount = 4;
-constexpr std::uint32_t kFewestBuffers = 2;    // one that is filled while the other is read
-constexpr std::int32_t kExposureUnitUs = 100;  // of V4L2_CID_EXPOSURE_ABSOLUTE
+constexpr std::uint32_t kFewestBuffers = 2;  // one that is filled while the other is read
 
 /// Whether the device is no longer there, so that only opening it again can help.
 bool IsGone(int error_number) {
@@ -55,8 +55,7 @@ Result<std::unique_ptr<V4l2Device>> V4l2Device::Open(V4l2System& system,
   if (auto ok = device->CheckCapabilities(); !ok) return std::move(ok).error();
   if (auto ok = device->AgreeOnFormat(config); !ok) return std::move(ok).error();
   device->AskForFrameRate(config.frame_rate_hz);
-  device->AskForQuality(config.jpeg_quality);
-  device->ReadExposure();
+  device->controls_ = ApplyControls(system, fd, config, device->format_.fourcc);
   if (auto ok = device->MapBuffers(); !ok) return std::move(ok).error();
   if (auto ok = device->StartStream(); !ok) return std::move(ok).error();
   return device;
@@ -133,6 +132,8 @@ Result<bool> V4l2Device::TryFormat(const CameraConfig& config, std::uint32_t fou
 }
 
 void V4l2Device::AskForFrameRate(double frame_rate_hz) {
+  format_.offered_rates =
+      ListFrameRates(system_, fd_, format_.fourcc, format_.width, format_.height).Text();
   constexpr double kDenominator = 1000.0;
   v4l2_streamparm parameters{};
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -143,27 +144,6 @@ void V4l2Device::AskForFrameRate(double frame_rate_hz) {
   const v4l2_fract& period = parameters.parm.capture.timeperframe;
   if (period.numerator == 0 || period.denominator == 0) return;
   format_.frame_rate_hz = static_cast<double>(period.denominator) / period.numerator;
-}
-
-void V4l2Device::AskForQuality(int quality) {
-  if (format_.fourcc != kFourccMjpeg) return;
-  v4l2_control control{};
-  control.id = V4L2_CID_JPEG_COMPRESSION_QUALITY;
-  control.value = quality;
-  system_.Ioctl(fd_, VIDIOC_S_CTRL, &control);  // most cameras choose it themselves
-}
-
-/// Once: with automatic exposure each reading would be a transfer over USB.
-void V4l2Device::ReadExposure() {
-  v4l2_control mode{};
-  mode.id = V4L2_CID_EXPOSURE_AUTO;
-  if (system_.Ioctl(fd_, VIDIOC_G_CTRL, &mode) != 0 || mode.value != V4L2_EXPOSURE_MANUAL) return;
-  v4l2_control exposure{};
-  exposure.id = V4L2_CID_EXPOSURE_ABSOLUTE;
-  if (system_.Ioctl(fd_, VIDIOC_G_CTRL, &exposure) != 0) return;
-  constexpr std::int32_t kLongest = 100'000;  // 10 s: more is not an exposure
-  if (exposure.value < 0 || exposure.value > kLongest) return;
-  format_.exposure_us = exposure.value * kExposureUnitUs;
 }
 
 Result<void> V4l2Device::MapBuffers() {

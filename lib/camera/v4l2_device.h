@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "camera/camera_config.h"
+#include "camera/v4l2_controls.h"
 #include "camera/v4l2_system.h"
 #include "core/result.h"
 #include "core/time.h"
@@ -18,11 +19,11 @@ namespace relocd {
 /// What the driver agreed to, which need not be what it was asked for.
 struct V4l2Format {
   std::uint32_t fourcc = 0;
-  int width = 0;                  ///< px
-  int height = 0;                 ///< px
-  int bytes_per_line = 0;         ///< Of raw formats.
-  double frame_rate_hz = 0.0;     ///< 0 when the driver does not say.
-  std::int32_t exposure_us = -1;  ///< Of a camera with a fixed exposure; else -1.
+  int width = 0;               ///< px
+  int height = 0;              ///< px
+  int bytes_per_line = 0;      ///< Of raw formats.
+  double frame_rate_hz = 0.0;  ///< 0 when the driver does not say.
+  std::string offered_rates;   ///< `30, 15 Hz`; empty when it does not say.
 };
 
 /// A filled buffer, which stays the driver's and may be read until it is given back.
@@ -63,6 +64,7 @@ class V4l2Device {
 
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] const V4l2Format& format() const { return format_; }
+  [[nodiscard]] const V4l2ControlsReport& controls() const { return controls_; }
 
  private:
   struct Mapping {
@@ -77,8 +79,6 @@ class V4l2Device {
   Result<void> AgreeOnFormat(const CameraConfig& config);
   Result<bool> TryFormat(const CameraConfig& config, std::uint32_t fourcc);
   void AskForFrameRate(double frame_rate_hz);
-  void AskForQuality(int quality);
-  void ReadExposure();
   Result<void> MapBuffers();
   Result<void> StartStream();
   Result<void> Call(unsigned long request, void* argument, std::string_view doing);
@@ -87,6 +87,7 @@ class V4l2Device {
   std::string path_;
   int fd_;
   V4l2Format format_;
+  V4l2ControlsReport controls_;
   std::vector<Mapping> buffers_;
 };
 

@@ -3,9 +3,11 @@
 #include <linux/videodev2.h>
 
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "camera/jpeg.h"
 
@@ -32,6 +34,17 @@ GrayImage CopyGrey(const V4l2Buffer& buffer, const V4l2Format& format) {
   return image;
 }
 
+/// What the driver says of the rate, and what was asked where that is another.
+std::string FrameRateText(const V4l2Format& format, double wanted_hz) {
+  constexpr double kSame = 0.01;  // periods are fractions of whole numbers
+  if (format.frame_rate_hz <= 0.0) return "";
+  std::string text = fmt::format(" at {:.4g} Hz", format.frame_rate_hz);
+  if (std::abs(format.frame_rate_hz - wanted_hz) <= kSame * wanted_hz) return text;
+  text += fmt::format(" (asked for {:.4g}", wanted_hz);
+  if (!format.offered_rates.empty()) text += ", allowed " + format.offered_rates;
+  return text + ")";
+}
+
 Error Damaged(std::string message) {
   return {ErrorKind::kInvalidInput, std::move(message)};
 }
@@ -53,10 +66,26 @@ void V4l2FrameSource::TryOpen(MonotonicTime now) {
   last_sequence_.reset();
   restarted_ = false;
   wake_up_ = now + Milliseconds(config_.no_frame_timeout_ms);
+  NoteControls();
+}
+
+/// Said again only when it changes: a device that gives no frames is opened every few seconds.
+void V4l2FrameSource::NoteControls() {
+  const V4l2ControlsReport& controls = device_->controls();
+  remark_ = fmt::format("{}", fmt::join(controls.otherwise, "; "));
+  if (!remark_.empty()) remark_ = config_.device + ": " + remark_;
+  std::vector<std::string> all = controls.otherwise;
+  all.insert(all.end(), controls.given.begin(), controls.given.end());
+  if (all.empty()) return;
+  std::string notice = fmt::format("{}: controls: {}", config_.device, fmt::join(all, "; "));
+  if (notice == said_of_controls_) return;
+  said_of_controls_ = notice;
+  notices_.push_back(std::move(notice));
 }
 
 void V4l2FrameSource::Lose(const std::string& why, MonotonicTime now) {
   device_.reset();
+  remark_.clear();
   wake_up_ = now + kReopenPeriod;
   gap_ = gap_ || counters_.delivered > 0;
   if (!lost_since_) lost_since_ = now;
@@ -125,7 +154,7 @@ std::optional<Frame> V4l2FrameSource::Fetch(const V4l2Buffer& buffer, MonotonicT
               .time = {},
               .sequence = buffer.sequence,
               .flags = std::exchange(gap_, false) ? kFrameAfterGap : 0,
-              .exposure_us = device_->format().exposure_us};
+              .exposure_us = device_->controls().exposure_us};
   StampTime(buffer, now, frame);
   NoteDelivery(now);
   return frame;
@@ -187,12 +216,12 @@ void V4l2FrameSource::NoteDelivery(MonotonicTime now) {
   wake_up_ = now + Milliseconds(config_.no_frame_timeout_ms);
   if (counters_.delivered > 1 && !lost_since_) return;
   const V4l2Format& format = device_->format();
-  std::string notice = fmt::format("{}: {} {} x {} px at {:g} Hz",
+  std::string notice = fmt::format("{}: {} {} x {} px{}",
                                    config_.device,
                                    FourccText(format.fourcc),
                                    format.width,
                                    format.height,
-                                   format.frame_rate_hz);
+                                   FrameRateText(format, config_.frame_rate_hz));
   if (lost_since_) {
     ++counters_.reopened;
     notice += fmt::format(", back after {:.1f} s", ToSeconds(now - *lost_since_));

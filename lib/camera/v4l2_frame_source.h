@@ -29,6 +29,7 @@ class V4l2FrameSource final : public FrameSource {
 
  private:
   void TryOpen(MonotonicTime now);
+  void NoteControls();
   /// Closes the device, to be opened again after a pause.
   void Lose(const std::string& why, MonotonicTime now);
   /// Restarts the stream; if that was the last thing tried, closes the device.
@@ -50,6 +51,7 @@ class V4l2FrameSource final : public FrameSource {
   bool gap_ = false;        ///< Frames before the next one were lost.
   bool restarted_ = false;  ///< The stream was restarted, and no frame came since.
   std::optional<MonotonicTime> lost_since_;
+  std::string said_of_controls_;
 };
 
 }  // namespace relocd

@@ -60,7 +60,9 @@ TEST_F(V4l2FrameSourceTest, GivesTheCamerasJpegsUnchanged) {
   EXPECT_FALSE(source.Next(now_));
   EXPECT_EQ(source.counters().delivered, 1);
   EXPECT_EQ(source.problem(), "");
-  EXPECT_THAT(source.TakeNotices(), ElementsAre(kDevice + ": MJPG 64 x 48 px at 30 Hz"));
+  EXPECT_THAT(source.TakeNotices(),
+              ElementsAre(kDevice + ": controls: jpeg_quality is the camera's own",
+                          kDevice + ": MJPG 64 x 48 px at 30 Hz"));
 }
 
 TEST_F(V4l2FrameSourceTest, GivesEachBufferBackAfterItWasFetched) {
@@ -171,7 +173,9 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& instance) { return instance.param.name; });
 
 TEST_F(V4l2FrameSourceTest, TheTimeIsTheMiddleOfAKnownExposure) {
-  camera_.manual_exposure = 80;  // 8 ms
+  camera_.controls = {
+      {.id = V4L2_CID_EXPOSURE_AUTO, .name = "Auto Exposure", .value = V4L2_EXPOSURE_MANUAL},
+      {.id = V4L2_CID_EXPOSURE_ABSOLUTE, .name = "Exposure Time, Absolute", .value = 80}};  // 8 ms
   CameraConfig config = Config();
   config.time_offset_ms = -1.5;
   V4l2FrameSource source(config, camera_);
@@ -300,6 +304,7 @@ TEST_F(V4l2FrameSourceTest, WaitsForACameraThatIsNotThereYet) {
   EXPECT_EQ(source.counters().reopened, 1);
   EXPECT_THAT(source.TakeNotices(),
               ElementsAre("no frames: " + kDevice + ": opening: No such file or directory",
+                          kDevice + ": controls: jpeg_quality is the camera's own",
                           kDevice + ": MJPG 64 x 48 px at 30 Hz, back after 0.5 s"));
 }
 

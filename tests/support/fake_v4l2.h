@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <string>
@@ -27,6 +28,18 @@ struct FakeFrame {
   int error = 0;  ///< errno of VIDIOC_DQBUF; 0 for a frame.
 };
 
+/// A control of a FakeV4l2.
+struct FakeControl {
+  std::uint32_t id = 0;
+  std::string name;
+  std::int32_t minimum = 0;
+  std::int32_t maximum = 255;
+  std::int32_t step = 1;
+  std::int32_t value = 0;
+  std::vector<std::int32_t> menu = {};  ///< The choices that it offers.
+  int set_error = 0;                    ///< errno of VIDIOC_S_CTRL.
+};
+
 /// A camera and its driver, in a test's hands. A buffer that is given back is scribbled over at
 /// once, so that whoever still reads it is found out.
 class FakeV4l2 final : public V4l2System {
@@ -43,8 +56,10 @@ class FakeV4l2 final : public V4l2System {
   std::uint32_t extra_bytes_per_line = 0;
   std::uint32_t granted_buffers = 4;
   bool has_frame_rate = true;
-  int manual_exposure = -1;  ///< In units of 100 us, or -1 for automatic.
-  bool restarts = true;      ///< Whether VIDIOC_STREAMOFF and VIDIOC_STREAMON work.
+  std::vector<v4l2_fract> frame_periods;  ///< That it lists; it takes the nearest of them.
+  bool lists_a_range = false;             ///< From the first to the last of frame_periods.
+  std::vector<FakeControl> controls;
+  bool restarts = true;  ///< Whether VIDIOC_STREAMOFF and VIDIOC_STREAMON work.
 
   /// Frames that wait to be fetched.
   std::deque<FakeFrame> frames;
@@ -56,6 +71,9 @@ class FakeV4l2 final : public V4l2System {
   int opened = 0;
 
   void Unplug() { plugged_in = false; }
+  [[nodiscard]] std::int32_t ValueOf(std::uint32_t id) const {
+    return std::ranges::find(controls, id, &FakeControl::id)->value;
+  }
   [[nodiscard]] int Count(const std::string& call) const {
     return static_cast<int>(std::ranges::count(calls, call));
   }
@@ -91,14 +109,14 @@ class FakeV4l2 final : public V4l2System {
       case VIDIOC_G_FMT:
         *static_cast<v4l2_format*>(argument) = format_;
         return 0;
+      case VIDIOC_ENUM_FMT:
+        return ListFormat(*static_cast<v4l2_fmtdesc*>(argument));
       case VIDIOC_S_PARM:
-        return has_frame_rate ? 0 : Fail(ENOTTY);
-      case VIDIOC_G_CTRL:
-        return GetControl(*static_cast<v4l2_control*>(argument));
-      case VIDIOC_S_CTRL:
-        return Fail(EINVAL);
+        return SetPeriod(static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe);
+      case VIDIOC_ENUM_FRAMEINTERVALS:
+        return ListPeriod(*static_cast<v4l2_frmivalenum*>(argument));
       default:
-        return StreamingIoctl(request, argument);
+        return ControlIoctl(request, argument);
     }
   }
 
@@ -108,6 +126,21 @@ class FakeV4l2 final : public V4l2System {
   static int Fail(int error) {
     errno = error;
     return -1;
+  }
+
+  int ControlIoctl(unsigned long request, void* argument) {
+    switch (request) {
+      case VIDIOC_QUERYCTRL:
+        return QueryControl(*static_cast<v4l2_queryctrl*>(argument));
+      case VIDIOC_QUERYMENU:
+        return QueryMenu(*static_cast<v4l2_querymenu*>(argument));
+      case VIDIOC_G_CTRL:
+        return GetControl(*static_cast<v4l2_control*>(argument));
+      case VIDIOC_S_CTRL:
+        return SetControl(*static_cast<v4l2_control*>(argument));
+      default:
+        return StreamingIoctl(request, argument);
+    }
   }
 
   int StreamingIoctl(unsigned long request, void* argument) {
@@ -141,6 +174,12 @@ class FakeV4l2 final : public V4l2System {
     return 0;
   }
 
+  int ListFormat(v4l2_fmtdesc& format) const {
+    if (format.index >= formats.size()) return Fail(EINVAL);
+    format.pixelformat = formats[format.index];
+    return 0;
+  }
+
   int SetFormat(v4l2_format& format) {
     calls.emplace_back("format");
     v4l2_pix_format& pix = format.fmt.pix;
@@ -158,14 +197,79 @@ class FakeV4l2 final : public V4l2System {
     return 0;
   }
 
-  int GetControl(v4l2_control& control) const {
-    if (control.id == V4L2_CID_EXPOSURE_AUTO) {
-      control.value = manual_exposure < 0 ? V4L2_EXPOSURE_AUTO : V4L2_EXPOSURE_MANUAL;
-      return 0;
+  FakeControl* FindControl(std::uint32_t id) {
+    const auto found = std::ranges::find(controls, id, &FakeControl::id);
+    return found == controls.end() ? nullptr : &*found;
+  }
+
+  /// As the kernel: controls are in the order of their ids.
+  int QueryControl(v4l2_queryctrl& query) {
+    const std::uint32_t id = query.id & ~V4L2_CTRL_FLAG_NEXT_CTRL;
+    const FakeControl* found = FindControl(id);
+    if ((query.id & V4L2_CTRL_FLAG_NEXT_CTRL) != 0) {
+      std::ranges::sort(controls, {}, &FakeControl::id);
+      const auto next = std::ranges::upper_bound(controls, id, {}, &FakeControl::id);
+      found = next == controls.end() ? nullptr : &*next;
     }
-    if (control.id != V4L2_CID_EXPOSURE_ABSOLUTE) return Fail(EINVAL);
-    control.value = manual_exposure;
+    if (found == nullptr) return Fail(EINVAL);
+    query = v4l2_queryctrl{};
+    query.id = found->id;
+    query.type = found->menu.empty() ? V4L2_CTRL_TYPE_INTEGER : V4L2_CTRL_TYPE_MENU;
+    found->name.copy(reinterpret_cast<char*>(query.name), sizeof(query.name) - 1);
+    query.minimum = found->minimum;
+    query.maximum = found->maximum;
+    query.step = found->step;
     return 0;
+  }
+
+  int QueryMenu(const v4l2_querymenu& query) {
+    const FakeControl* control = FindControl(query.id);
+    if (control == nullptr) return Fail(EINVAL);
+    const auto choice = static_cast<std::int32_t>(query.index);
+    return std::ranges::count(control->menu, choice) > 0 ? 0 : Fail(EINVAL);
+  }
+
+  int GetControl(v4l2_control& wanted) {
+    const FakeControl* control = FindControl(wanted.id);
+    if (control == nullptr) return Fail(EINVAL);
+    wanted.value = control->value;
+    return 0;
+  }
+
+  int SetControl(const v4l2_control& wanted) {
+    calls.emplace_back("control");
+    FakeControl* control = FindControl(wanted.id);
+    if (control == nullptr) return Fail(EINVAL);
+    if (control->set_error != 0) return Fail(control->set_error);
+    control->value = wanted.value;
+    return 0;
+  }
+
+  int SetPeriod(v4l2_fract& period) const {
+    if (!has_frame_rate) return Fail(ENOTTY);
+    if (frame_periods.empty()) return 0;
+    const double wanted_s = Seconds(period);
+    period = *std::ranges::min_element(frame_periods, {}, [&](const v4l2_fract& offered) {
+      return std::abs(Seconds(offered) - wanted_s);
+    });
+    return 0;
+  }
+
+  int ListPeriod(v4l2_frmivalenum& interval) const {
+    if (interval.index >= frame_periods.size()) return Fail(EINVAL);
+    if (lists_a_range) {
+      interval.type = V4L2_FRMIVAL_TYPE_STEPWISE;
+      interval.stepwise.min = frame_periods.front();
+      interval.stepwise.max = frame_periods.back();
+    } else {
+      interval.type = V4L2_FRMIVAL_TYPE_DISCRETE;
+      interval.discrete = frame_periods[interval.index];
+    }
+    return 0;
+  }
+
+  static double Seconds(const v4l2_fract& period) {
+    return static_cast<double>(period.numerator) / period.denominator;
   }
 
   int RequestBuffers(v4l2_requestbuffers& request) {

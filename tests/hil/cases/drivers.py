@@ -3,7 +3,8 @@
 import re
 import subprocess
 
-from machine import binary, check, feed_camera
+import machine
+from machine import binary, check, deploy, feed_camera, journal, make_can, output_of, statuses, wait_until
 
 
 def _run_tests(program, *arguments):
@@ -30,6 +31,27 @@ def _camera(pixel_format):
     check("V4l2KernelTest.ARealCameraGivesFrames" in ran, "the one with a real device was among them")
     player.kill()
     player.wait()
+
+
+def camera_controls():
+    """With the loopback driver's own controls; it has none of a camera's, which is said."""
+    def control(name):
+        return int(output_of("v4l2-ctl", "-d", "/dev/video0", "-C", name).split(":")[1])
+    make_can()
+    asked = "{exposure: manual, gain: 20, others: {timeout: 70000, keep_format: 7, no_such_control: 1}}"
+    shipped = (machine.SOURCE / "packaging/robot.yaml").read_text()
+    deploy(config=shipped.replace("    width: 640\n", f"    width: 640\n    controls: {asked}\n"))
+    feed_camera()
+    wait_until(lambda: "MJPG 640 x 480 px" in journal(), "images come", 15)
+    said = journal()
+    for text in ("it has no exposure;", "it has no gain;", "it has no control 'no_such_control'", "jpeg_quality is the camera's own", "timeout 70000",
+                 "keep_format is 1, asked for 7, allowed [0, 1]"):
+        check(text in said, f"the journal says: {text}")
+    check(said.count("controls:") == 1, "once")
+    check(control("timeout") == 70000, "the driver has what was asked for")
+    status = statuses()["camerad_front"]
+    check(status["level"] == "WARNING" and "it has no gain" in status["message"], f"the status goes on saying so: {status['message']}")
+    check("timeout" in output_of("sh", "-c", "reloc doctor || true"), "reloc doctor lists what the camera offers")
 
 
 def camera():

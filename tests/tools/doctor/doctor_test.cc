@@ -49,6 +49,7 @@ class FakeMachine final : public SystemProbes {
   std::optional<std::int64_t> free_bytes = 50'000'000'000;
   std::string loop_back_error;
   bool clock_is_synchronized = true;
+  Result<std::string> camera_offers = std::string("MJPG 640 x 480 px at 30 Hz; no controls");
   Result<MapCamera> map_camera = MapCamera{.width = 640, .height = 480};
 
   std::optional<std::string> Read(const std::string& path) override {
@@ -69,6 +70,9 @@ class FakeMachine final : public SystemProbes {
   }
   bool IsClockSynchronized() override { return clock_is_synchronized; }
   Result<MapCamera> ReadMapCamera(const std::string& /*path*/) override { return map_camera; }
+  Result<std::string> DescribeCamera(const CameraConfig& /*config*/) override {
+    return camera_offers;
+  }
 };
 
 class DoctorTest : public testing::Test {
@@ -182,6 +186,16 @@ TEST_F(DoctorTest, AServiceUserWhoMayNotOpenCamerasIsSaid) {
   EXPECT_THAT(Only("group video").command, StartsWith("sudo adduser relocd video"));
   machine_.outputs.erase("id -nG relocd");
   EXPECT_EQ(Only("group video").command, "sudo systemd-sysusers relocd.conf");
+}
+
+TEST_F(DoctorTest, SaysWhatTheCameraOffers) {
+  const auto found = [this] {
+    const auto findings = Examine(config_, "/etc/relocd/robot.yaml", machine_);
+    return std::ranges::find(findings, "camera front", &Finding::name)->found;
+  };
+  EXPECT_EQ(found(), "/dev/video0: MJPG 640 x 480 px at 30 Hz; no controls");
+  machine_.camera_offers = Error{ErrorKind::kUnavailable, "permission denied"};
+  EXPECT_EQ(found(), "/dev/video0 is there");
 }
 
 TEST_F(DoctorTest, ACameraThatIsNotThereIsNamedWithItsKey) {
