@@ -11,6 +11,7 @@ import os
 import pathlib
 import re
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -23,6 +24,11 @@ CAN_LOG = WORK / "can0.log"
 TRUTH = WORK / "truth_body.csv"
 VEHICLE = SOURCE / "config/vehicles/differential_demo.yaml"
 FRAMES = 150
+
+
+def check_quietly(condition, what):
+    if not condition:
+        check(condition, what)
 
 
 def run(*command, **options):
@@ -131,6 +137,47 @@ def replay():
     check((out / "first.lcmlog").read_bytes() == (out / "second.lcmlog").read_bytes(), "two replays give the same bytes")
     error_m = mean_error_m(localization(out / "first.lcmlog", out))
     check(error_m < 1.5, f"mean error of the replayed pose is {error_m:.3f} m")
+
+
+def log_events(path):
+    """The events of a file in LCM's log format, as lists: [number, wall clock of the arrival in us, channel, bytes]."""
+    data, place = path.read_bytes(), 0
+    while place < len(data):
+        sync, number, wall_us, channel_size, size = struct.unpack_from(">IqqII", data, place)
+        check_quietly(sync == 0xEDA1DA01, f"{path} is whole at byte {place}")
+        begin = place + 28 + channel_size
+        yield [number, wall_us, data[begin - channel_size:begin].decode(), data[begin:begin + size]]
+        place = begin + size
+
+
+def with_wall_clock(body, change):
+    """A message whose utime, which is the first field of all of ours, is `change` of what it was."""
+    if len(body) < 16:  # LCM's own, to itself
+        return body
+    return body[:8] + struct.pack(">q", change(*struct.unpack_from(">q", body, 8))) + body[16:]
+
+
+def clock_steps():
+    """The wall clock steps by an hour, on and back, while the robot drives: replayed, the estimates are the same bit for bit."""
+    out = WORK / "clock_steps"
+    out.mkdir(exist_ok=True)
+    events = list(log_events(live_log()))
+    hour_us, third = 3_600_000_000, len(events) // 3
+    step_us = [0] * third + [hour_us] * third + [-hour_us] * (len(events) - 2 * third)
+    with open(out / "stepped.lcmlog", "wb") as stepped:
+        for step, (number, wall_us, channel, body) in zip(step_us, events):
+            body = with_wall_clock(body, lambda utime: utime + step)
+            stepped.write(struct.pack(">IqqII", 0xEDA1DA01, number, wall_us + step, len(channel), len(body)) + channel.encode() + body)
+    estimates = {}
+    for name, log in (("steady", live_log()), ("stepped", out / "stepped.lcmlog")):
+        run(BIN / "reloc", "replay", "--log", log, "--out", out / f"{name}.out.lcmlog", "--config", WORK / "live/robot.yaml",
+            "--nodes", "odometry,inference,smoothing")
+        estimates[name] = list(log_events(out / f"{name}.out.lcmlog"))
+    same_but_wall = {name: [(channel, with_wall_clock(body, lambda utime: 0)) for _, _, channel, body in of_log] for name, of_log in estimates.items()}
+    check(len(same_but_wall["steady"]) > 1000 and same_but_wall["steady"] == same_but_wall["stepped"],
+          f"all {len(same_but_wall['steady'])} messages are the same but for the wall clock")
+    steps = {struct.unpack_from(">q", b[3], 8)[0] - struct.unpack_from(">q", a[3], 8)[0] for a, b in zip(estimates["steady"], estimates["stepped"])}
+    check({0, hour_us, -hour_us} <= steps, "which has stepped in them")
 
 
 def logplayer():

@@ -310,6 +310,8 @@ def clock_steps():
     check(len(times) > 500 and gap_s < 0.2, f"{len(times)} ODOMETRY in 6 s, the longest gap {gap_s:.3f} s")
     kept = {name: said["values"][name] - before[name] for name in ("gaps", "jumps", "guesses", "out_of_order")}
     check(not any(kept.values()), f"odometry saw nothing of it: {kept}")
+    poses = [time_ns for time_ns in times_of("LOCALIZATION") if begin_ns <= time_ns < end_ns]
+    check(poses == times, f"{len(poses)} LOCALIZATION, each of the time of its ODOMETRY")
 
 
 def disk_full():
