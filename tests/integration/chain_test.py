@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import struct
 import subprocess
@@ -202,6 +203,27 @@ def logplayer():
     print(output_of(BIN / "reloc", "log", "info", log), flush=True)
     error_m = mean_error_m(localization(log, out))
     check(error_m < 1.5, f"mean error of the pose from lcm-logplayer is {error_m:.3f} m")
+
+
+def subscriber():
+    """A program of somebody else's, built against what relocd-dev installs, by CMake and by pkg-config, prints the recorded poses."""
+    out = WORK / "subscriber"
+    shutil.rmtree(out, ignore_errors=True)
+    run("cmake", "--install", BUILD, "--component", "relocd-dev", env={**os.environ, "DESTDIR": str(out / "root")})
+    prefix, example = out / "root/usr", out / "root/usr/share/doc/relocd-dev/examples"
+    run("cmake", "-S", example, "-B", out / "build", f"-DCMAKE_PREFIX_PATH={prefix}")
+    run("cmake", "--build", out / "build")
+    flags = output_of("env", f"PKG_CONFIG_PATH={prefix / 'share/pkgconfig'}", f"PKG_CONFIG_SYSROOT_DIR={out / 'root'}",
+                      "pkg-config", "--cflags", "--libs", "relocd-messages").split()
+    run("c++", "-Wall", "-Wextra", "-Werror", "-o", out / "by_pkg_config", example / "print_pose.cc", *flags)
+    for program in (out / "build/print_pose", out / "by_pkg_config"):
+        printer = subprocess.Popen([program], stdout=subprocess.PIPE, text=True)
+        time.sleep(0.5)
+        run("lcm-logplayer", "-s", "10", "-e", "LOCALIZATION", "-l", "udpm://239.255.76.67:7667?ttl=0", live_log())
+        time.sleep(0.5)
+        printer.kill()
+        poses = [line.split() for line in printer.communicate()[0].splitlines()]
+        check(len(poses) > 500 and all(len(pose) == 6 for pose in poses), f"{program.name} prints {len(poses)} poses, the last {' '.join(poses[-1])}")
 
 
 def child_pids(relocd):
