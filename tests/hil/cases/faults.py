@@ -249,6 +249,8 @@ def daemons_killed_all_at_once():
 
 def supervisor_killed():
     _drive_wheels()
+    run("reloc", "set-pose", "1", "2", "0.5")
+    wait_until(lambda: os.path.exists("/run/relocd/smootherd.state"), "smootherd keeps its pose")
     main, begin = service("MainPID"), time.monotonic()
     os.kill(int(main), signal.SIGKILL)
     wait_until(lambda: service("NRestarts") == "1" and service("SubState") == "running", "systemd starts it again", 10)
@@ -256,6 +258,7 @@ def supervisor_killed():
     wait_until(lambda: service("StatusText").startswith("4/4"), "all daemons are ready", 10)
     names = subprocess.run(["ps", "-o", "comm=", "-u", "relocd"], stdout=subprocess.PIPE, text=True).stdout.split()
     check(sorted(names) == ["camerad", "odometryd", "recorderd", "relocd", "smootherd"], f"each daemon is there once: {names}")
+    wait_until(lambda: "begins at the saved pose" in journal(), "smootherd goes on from the pose that it saved")
 
 
 def supervisor_hangs():
