@@ -83,6 +83,8 @@ TEST_F(ChildProcessTest, IsScheduledAsAskedOrSaysWhyNot) {
   ASSERT_TRUE(child);
   EXPECT_EQ(WaitForEnd(*child), 0);
   EXPECT_THAT(Log(), HasSubstr("nice=7"));
+  // Far above the watchdog: a search for memory on its behalf is no endless loop.
+  EXPECT_THAT(Log(), HasSubstr("real_time_run_us=10000000"));
   if (child->warning().empty()) {
     EXPECT_THAT(Log(), HasSubstr("fifo=true"));
   } else {

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -93,6 +94,12 @@ class TestChild {
     Log(fmt::format("grandchild {}", pid));
   }
 
+  static std::int64_t RealTimeRunUs() {
+    rlimit limit{};
+    ::getrlimit(RLIMIT_RTTIME, &limit);
+    return static_cast<std::int64_t>(limit.rlim_cur);
+  }
+
   void Describe() const {
     int death_signal = 0;
     ::prctl(PR_GET_PDEATHSIG, &death_signal);
@@ -103,14 +110,15 @@ class TestChild {
     char stdin_byte = 0;
     Log(
         fmt::format("group_leader={} death_signal={} blocked_term={} open_files={} stdin={} "
-                    "nice={} fifo={}",
+                    "nice={} fifo={} real_time_run_us={}",
                     ::getpgrp() == ::getpid(),
                     death_signal,
                     ::sigismember(&inherited_, SIGTERM),
                     open_files,
                     ::read(STDIN_FILENO, &stdin_byte, 1),
                     ::getpriority(PRIO_PROCESS, 0),
-                    ::sched_getscheduler(0) == SCHED_FIFO));
+                    ::sched_getscheduler(0) == SCHED_FIFO,
+                    RealTimeRunUs()));
   }
 
   void Grow(std::size_t bytes) { memory_.assign(bytes, 'x'); }
