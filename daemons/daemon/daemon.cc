@@ -36,9 +36,9 @@ class Frame {
                    const std::function<Result<std::unique_ptr<Daemon>>(DaemonContext&)>& make) {
     auto loop = EventLoop::Create();
     if (!loop) return std::move(loop).error();
-    if (auto ok = OpenBus(config_.bus.control_url, *loop, control_bus_); !ok) return ok;
+    if (auto ok = OpenBus(config_.bus.control_url, control_bus_); !ok) return ok;
     if (info.uses_images) {
-      if (auto ok = OpenBus(config_.bus.image_url, *loop, image_bus_); !ok) return ok;
+      if (auto ok = OpenBus(config_.bus.image_url, image_bus_); !ok) return ok;
     }
     DaemonContext context{.config = config_,
                           .loop = *loop,
@@ -49,6 +49,9 @@ class Frame {
                           .instance = instance_};
     auto daemon = make(context);
     if (!daemon) return std::move(daemon).error();
+    for (LcmBus* bus : {control_bus_.get(), image_bus_.get()}) {
+      if (auto ok = Follow(bus, *loop); !ok) return ok;
+    }
     if (auto ok = StartTimers(*loop, **daemon); !ok) return ok;
     service_manager_.Ready();
     PublishStatus(**daemon);
@@ -59,11 +62,17 @@ class Frame {
   }
 
  private:
-  Result<void> OpenBus(const std::string& url, EventLoop& loop, std::unique_ptr<LcmBus>& bus) {
+  static Result<void> OpenBus(const std::string& url, std::unique_ptr<LcmBus>& bus) {
     auto opened = LcmBus::Open(url);
     if (!opened) return std::move(opened).error();
     bus = std::move(opened).value();
-    return loop.OnReadable(bus->fd(), [&bus] { bus->HandlePending(); });
+    return {};
+  }
+
+  /// A daemon that only publishes is not woken by the messages of all others, its own included.
+  static Result<void> Follow(LcmBus* bus, EventLoop& loop) {
+    if (bus == nullptr || !bus->is_listening()) return {};
+    return loop.OnReadable(bus->fd(), [bus] { bus->HandlePending(); });
   }
 
   Result<void> StartTimers(EventLoop& loop, Daemon& daemon) {

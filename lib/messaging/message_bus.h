@@ -93,6 +93,10 @@ class MessageBus {
   /// To be watched for readability by an event loop; -1 for a bus that has no use of it.
   [[nodiscard]] virtual int fd() const = 0;
 
+  /// Whether anything is subscribed to, so that fd() is worth watching: with LCM, asking for it
+  /// starts a thread that takes in every message of the network.
+  [[nodiscard]] bool is_listening() const { return !subscriptions_.empty(); }
+
   /// By the name or pattern subscribed to.
   [[nodiscard]] std::map<std::string, ChannelCounters> counters() const;
 

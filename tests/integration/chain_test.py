@@ -241,6 +241,8 @@ def kill_children():
     """Runs beside relocd: kills each child in turn, and writes how long each took to come back."""
     relocd = os.environ["RELOCD_PID"]
     time.sleep(5.0)
+    threads = {name: len(os.listdir(f"/proc/{pid}/task")) for name, pid in child_pids(relocd).items()}
+    (WORK / "kill/threads.json").write_text(json.dumps(threads))
     seconds = {}
     for name in ("recorderd", "odometryd", "camerad", "inferenced", "smootherd"):
         old = child_pids(relocd)[name]
@@ -258,6 +260,8 @@ def kill():
     out.mkdir(exist_ok=True)
     logs = play(out, sys.executable, __file__, SOURCE, BUILD, WORK, "kill_children")
     seconds = json.loads((out / "seconds.json").read_text())
+    threads = json.loads((out / "threads.json").read_text())
+    check(threads["odometryd"] == threads["camerad"] == 1, f"who only publishes has no thread of LCM's that takes all messages in: {threads}")
     for name, duration in seconds.items():
         check(duration < 1.0, f"{name} was killed and runs again after {duration:.2f} s")
     check(len(logs) == 2, "the recorder's second run began a file of its own")

@@ -42,6 +42,13 @@ class MessageBusTest : public testing::TestWithParam<BusCase> {
   std::unique_ptr<MessageBus> bus_ = GetParam().make();
 };
 
+TEST_P(MessageBusTest, ListensOnceSomethingIsSubscribedTo) {
+  PublishOdometry(0);
+  EXPECT_FALSE(bus_->is_listening());
+  bus_->Subscribe<odometry_t>(channels::kOdometry, Delivery::kEvery, [](const odometry_t&) {});
+  EXPECT_TRUE(bus_->is_listening());
+}
+
 TEST_P(MessageBusTest, HandsOnEveryMessageInOrder) {
   std::vector<std::int64_t> seqs;
   bus_->Subscribe<odometry_t>(channels::kOdometry,
