@@ -158,6 +158,7 @@ class ControlSetter {
         wanted->values, [&](std::int32_t value) { return std::ranges::count(choices, value) > 0; });
     if (choice == wanted->values.end()) {
       std::vector<std::string> offered;
+      offered.reserve(choices.size());
       for (const std::int32_t value : choices)
         offered.push_back(WordOf(words, value));
       report_.otherwise.push_back(
@@ -238,8 +239,8 @@ void ApplyOthers(const std::map<std::string, int>& others,
 
 /// Once: with automatic exposure each reading would be a transfer over USB.
 void ReadExposure(ControlSetter& setter) {
-  const auto mode = setter.Get(V4L2_CID_EXPOSURE_AUTO);
-  if (mode != V4L2_EXPOSURE_MANUAL && mode != V4L2_EXPOSURE_SHUTTER_PRIORITY) return;
+  const std::int32_t mode = setter.Get(V4L2_CID_EXPOSURE_AUTO).value_or(V4L2_EXPOSURE_AUTO);
+  if (WordOf(ExposureWords(), mode) != "manual") return;
   const auto exposure = setter.Get(V4L2_CID_EXPOSURE_ABSOLUTE);
   constexpr std::int32_t kLongest = 100'000;  // 10 s: more is not an exposure
   if (!exposure || *exposure < 0 || *exposure > kLongest) return;
@@ -269,8 +270,10 @@ V4l2ControlsReport ApplyControls(V4l2System& system,
 }
 
 std::vector<std::string> ListControls(V4l2System& system, int fd) {
+  const auto controls = AllControls(system, fd);
   std::vector<std::string> texts;
-  for (const v4l2_queryctrl& control : AllControls(system, fd))
+  texts.reserve(controls.size());
+  for (const v4l2_queryctrl& control : controls)
     texts.push_back(fmt::format("{} {}", NameOf(control), RangeText(control)));
   return texts;
 }
