@@ -32,11 +32,14 @@ void ChangeValues(GrayImage& image, const Function& function) {
       });
 }
 
+/// A lens out of focus spreads light over a part of the picture, however many pixels are there.
 void Blur(GrayImage& image) {
   constexpr double kSigmaPx = 2.0;
+  constexpr double kPixels = 640.0 * 480.0;
+  const double sigma_px = kSigmaPx * std::sqrt(image.width * image.height / kPixels);
   const cv::Mat view(image.height, image.width, CV_8U, image.pixels.data());
   cv::Mat blurred;
-  cv::GaussianBlur(view, blurred, {0, 0}, kSigmaPx);
+  cv::GaussianBlur(view, blurred, {0, 0}, sigma_px);
   std::copy(blurred.begin<std::uint8_t>(), blurred.end<std::uint8_t>(), image.pixels.begin());
 }
 

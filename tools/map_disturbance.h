@@ -15,7 +15,7 @@ enum class Disturbance {
   kNone,
   kGamma,      ///< Of 1.8: middle tones get darker.
   kDark,       ///< Half the brightness.
-  kBlur,       ///< With a standard deviation of 2 px.
+  kBlur,       ///< With a standard deviation of 2 px in a picture of 640 x 480, in proportion else.
   kNoise,      ///< With a standard deviation of 12 of 255.
   kOccluders,  ///< Four gray rectangles, 200 x 150 px in a picture of 640 x 480, in proportion
                ///< else.
