@@ -1,6 +1,8 @@
 #include "map_disturbance.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include <gmock/gmock.h>
@@ -60,6 +62,23 @@ TEST(MapDisturbanceTest, TheSeedDecides) {
     EXPECT_EQ(Disturb(image, disturbance, 1).pixels, Disturb(image, disturbance, 1).pixels);
     EXPECT_NE(Disturb(image, disturbance, 1).pixels, Disturb(image, disturbance, 2).pixels);
   }
+}
+
+/// Pixels of a row that are neither as dark as one side of an edge nor as bright as the other.
+int EdgeWidth(int width, int height) {
+  GrayImage edge{.width = width, .height = height, .pixels = {}};
+  for (int pixel = 0; pixel < width * height; ++pixel)
+    edge.pixels.push_back(pixel % width < width / 2 ? 0 : 250);
+  const GrayImage blurred = Disturb(edge, Disturbance::kBlur, 1);
+  return static_cast<int>(
+      std::count_if(blurred.pixels.begin(), blurred.pixels.begin() + width, [](std::uint8_t value) {
+        return value > 10 && value < 240;
+      }));
+}
+
+TEST(MapDisturbanceTest, BlursInProportionToThePicturesSize) {
+  EXPECT_NEAR(EdgeWidth(640, 480), 2.0 * 2.0 * 1.75, 1.0);  // 4 % and 96 % of a Gaussian
+  EXPECT_NEAR(EdgeWidth(1280, 960), 2 * EdgeWidth(640, 480), 2);
 }
 
 TEST(MapDisturbanceTest, MirroredTwiceIsTheImage) {
