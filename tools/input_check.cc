@@ -98,6 +98,9 @@ std::string FormatInputCheck(const InputCheck& check, const std::string& name) {
     if (summary.camera_height_m) {
       fmt::format_to(out, ", ground {:.1f} m below the camera", *summary.camera_height_m);
     }
+    if (summary.depth_factor) {
+      fmt::format_to(out, ", {:.2f} times as far in the depth images", *summary.depth_factor);
+    }
     text += summary.focal_factor
                 ? fmt::format(", focal length fits best at {:.2f} times\n", *summary.focal_factor)
                 : std::string(", too few turns to check the focal length\n");

@@ -39,7 +39,9 @@ struct InputSummary {
   double parallax_deg = 0.0;   ///< Median, over the few views of a segment.
   double depth_m = 0.0;        ///< Median distance of the corners.
   std::optional<double> camera_height_m;  ///< Above what is seen below the horizon.
-  std::optional<double> focal_factor;     ///< At which the corners fit best, if that can be told.
+  /// Depths of the depth images over those that follow from the poses, in the median.
+  std::optional<double> depth_factor;
+  std::optional<double> focal_factor;  ///< At which the corners fit best, if that can be told.
 };
 
 struct InputCheck {

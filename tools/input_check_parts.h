@@ -7,6 +7,7 @@
 #include "camera/dataset.h"
 #include "corner_tracks.h"
 #include "input_check.h"
+#include "track_geometry.h"
 
 namespace relocd {
 
@@ -44,10 +45,20 @@ void CheckImageQuality(const Dataset& dataset,
                        InputSummary& summary,
                        InputFindings& findings);
 
+/// In what numbers pieces of corner tracks are judged.
+SegmentScale JudgingScale(const Dataset& dataset);
+
 /// The poses' convention, the focal length, time offsets, single wrong poses, parallax, scale.
 void CheckPoses(const Dataset& dataset,
                 const TrackedDrive& drive,
                 InputSummary& summary,
                 InputFindings& findings);
+
+/// Depth images that are missing or of another kind, and whether they are in millimetres: by the
+/// corners whose distance follows from the poses. To be called when the poses are right.
+void CheckDepthImages(const Dataset& dataset,
+                      const TrackedDrive& drive,
+                      InputSummary& summary,
+                      InputFindings& findings);
 
 }  // namespace relocd

@@ -40,12 +40,10 @@ std::vector<TrackSegment> Thinned(const std::vector<TrackSegment>& segments, std
 }
 
 Evidence MakeEvidence(const Dataset& dataset, const TrackedDrive& drive) {
-  constexpr double kToleranceRad = 0.003;
   constexpr std::size_t kViews = 5;
   constexpr std::size_t kFewViews = 3;
   Evidence evidence;
-  evidence.scale.focal_px = dataset.intrinsics.fx;
-  evidence.scale.tolerance_px = std::max(1.0, kToleranceRad * dataset.intrinsics.fx);
+  evidence.scale = JudgingScale(dataset);
   evidence.segments = InformativeSegments(drive.tracks, kViews, evidence.scale, kManySegments);
   if (evidence.segments.size() < kSomeSegments) {
     evidence.segments = InformativeSegments(drive.tracks, kFewViews, evidence.scale, kManySegments);
@@ -323,6 +321,12 @@ void CheckScale(const InputSummary& summary, InputFindings& findings) {
 
 }  // namespace
 
+SegmentScale JudgingScale(const Dataset& dataset) {
+  constexpr double kToleranceRad = 0.003;
+  return {.focal_px = dataset.intrinsics.fx,
+          .tolerance_px = std::max(1.0, kToleranceRad * dataset.intrinsics.fx)};
+}
+
 void CheckPoses(const Dataset& dataset,
                 const TrackedDrive& drive,
                 InputSummary& summary,
@@ -352,6 +356,7 @@ void CheckPoses(const Dataset& dataset,
   FindWrongFrames(dataset, drive, evidence, findings);
   CheckParallax(dataset, summary, findings);
   CheckScale(summary, findings);
+  CheckDepthImages(dataset, drive, summary, findings);
 }
 
 }  // namespace relocd

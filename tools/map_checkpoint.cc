@@ -96,9 +96,10 @@ std::string FingerprintOf(const std::vector<SelectedFrames>& drives) {
       const auto size = std::filesystem::file_size(frame.image_path, ignored);
       const auto changed = std::filesystem::last_write_time(frame.image_path, ignored);
       const Eigen::Quaterniond& q = frame.X_WC.rotation();
-      text += fmt::format("{} {} {} {} {} {}\n",
+      text += fmt::format("{} {} {} {} {} {} {}\n",
                           frame.index,
                           frame.image_path,
+                          frame.depth_path,
                           size,
                           changed.time_since_epoch().count(),
                           fmt::join(std::span(frame.X_WC.translation().data(), 3), " "),

@@ -21,6 +21,7 @@
 #include "camera/jpeg.h"
 #include "camera/pinhole_camera.h"
 #include "core/sha256.h"
+#include "depth_file.h"
 #include "features/gradient_histograms.h"
 #include "map_calibration.h"
 #include "map_route.h"
@@ -77,6 +78,20 @@ Result<std::vector<TrainingImage>> LoadImages(const std::vector<RouteFrame>& fra
     images.push_back({std::move(*image), X_WD * frame.X_WC, static_cast<int>(drive)});
   }
   return images;
+}
+
+/// The depth images of those that have one.
+Result<void> LoadDepths(const std::vector<RouteFrame>& frames,
+                        const CameraIntrinsics& camera,
+                        std::vector<TrainingImage>& images) {
+  for (std::size_t index = 0; index < frames.size(); ++index) {
+    const std::string& path = frames[index].frame.depth_path;
+    if (path.empty()) continue;
+    auto depth = ReadDepthFile(path, camera.width, camera.height);
+    if (!depth) return std::move(depth).error();
+    images[index].depth = std::move(*depth);
+  }
+  return {};
 }
 
 std::vector<TrainingPose> CoarsePoses(const std::vector<TrainingImage>& images) {
@@ -239,9 +254,9 @@ Result<TrainedRegion> TrainRegion(std::size_t index,
     }
   }
   const SceneMap& map = training.map;
-  const auto images =
-      LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
-  if (!images) return images.error();
+  auto images = LoadImages(frames.training, map.camera, Pose3(map.R_WD, Eigen::Vector3d::Zero()));
+  if (!images) return std::move(images).error();
+  if (auto ok = LoadDepths(frames.training, map.camera, *images); !ok) return std::move(ok).error();
   RegionObserver observer(index, frames, training, show);
   TrainingSetConfig cells = training.options.cells;
   cells.seed = training.options.seed;

@@ -20,6 +20,7 @@
 #include "camera/bounded_jpeg_encoder.h"
 #include "config/config.h"
 #include "core/file.h"
+#include "depth_file.h"
 #include "progress_line.h"
 #include "sim_commands.h"
 #include "sim_live.h"
@@ -56,6 +57,7 @@ struct Options {
   int samples = 4;
   int threads = 0;
   bool no_images = false;
+  bool depth = false;
 
   DrivePlanOptions plan;
   VehicleBodyOptions body;
@@ -122,6 +124,7 @@ struct Setup {
   DbcFile dbc;
   CameraIntrinsics intrinsics;
   std::uint64_t drive_seed = 0;
+  bool with_depth = false;
   std::map<std::string, std::string> copies;  ///< Of the vehicle's files.
 };
 
@@ -187,6 +190,7 @@ Result<Setup> Prepare(const Options& options) {
                .dbc = *dbc,
                .intrinsics = *intrinsics,
                .drive_seed = DriveSeed(options),
+               .with_depth = options.depth,
                .copies = *copies};
 }
 
@@ -295,6 +299,17 @@ class Drive {
   VehicleBody body_;
 };
 
+Result<void> AddDepth(FrameRenderer& renderer,
+                      std::int64_t time_ns,
+                      const FrameRenderer::CameraMotion& camera_at,
+                      const DriveWriter& writer) {
+  const auto path = writer.MakeDepthPath();
+  if (!path) return path.error();
+  auto written = WriteDepthFile(*path, renderer.RenderDepth(time_ns, camera_at));
+  if (!written) return writer.Incomplete(std::move(written).error());
+  return {};
+}
+
 /// Renders all images, writes them, and hands them to who plays them.
 Result<void> RenderImages(const Drive& drive,
                           const Setup& setup,
@@ -311,6 +326,9 @@ Result<void> RenderImages(const Drive& drive,
     auto jpeg = encoder.Encode((*renderer)->Render(X_WCs[i].time_ns, camera_at));
     if (!jpeg) return writer.Incomplete(std::move(jpeg).error());
     if (auto ok = writer.AddImage(*jpeg); !ok) return ok;
+    if (setup.with_depth) {
+      if (auto ok = AddDepth(**renderer, X_WCs[i].time_ns, camera_at, writer); !ok) return ok;
+    }
     if (live != nullptr) {
       if (auto ok = live->AddImage(*jpeg); !ok) return writer.Incomplete(std::move(ok).error());
     }
@@ -432,6 +450,7 @@ void AddCameraOptions(CLI::App& app, Options& options) {
   app.add_option("--threads", options.threads, "for rendering; 0: as many as cores")
       ->capture_default_str();
   app.add_flag("--no-images", options.no_images, "only CAN frames and truth");
+  app.add_flag("--depth", options.depth, "depth images too, as an ideal depth camera has them");
 }
 
 void AddDrivingOptions(CLI::App& app, DrivePlanOptions& plan) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <utility>
 
@@ -91,6 +92,14 @@ Error WrongCount(const std::string& directory, std::size_t poses, std::size_t im
                       images)};
 }
 
+/// `depth/NAME.png` of the folder, if it is there.
+std::string DepthPathOf(const std::string& directory, std::string_view image) {
+  std::string path =
+      fmt::format("{}/depth/{}.png", directory, std::filesystem::path(image).stem().string());
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored) ? path : std::string();
+}
+
 }  // namespace
 
 Result<CameraIntrinsics> ParseIntrinsics(std::string_view text, const std::string& path) {
@@ -173,6 +182,7 @@ Result<Dataset> ReadDataset(const std::string& directory) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     dataset.frames.push_back({.index = static_cast<int>(i),
                               .image_path = fmt::format("{}/{}", directory, images[i].text),
+                              .depth_path = DepthPathOf(directory, images[i].text),
                               .time_ns = (*poses)[i].time_ns,
                               .X_WC = (*poses)[i].X_WB});
   }

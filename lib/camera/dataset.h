@@ -16,6 +16,7 @@ namespace relocd {
 struct DatasetFrame {
   int index = 0;             ///< Row in frames.txt, counted from 0.
   std::string image_path;    ///< Can be opened as it is: begins with the data set's folder.
+  std::string depth_path{};  ///< The same of its depth image; empty where there is none.
   std::int64_t time_ns = 0;  ///< In the recording's own time base; increases from frame to frame.
   Pose3 X_WC;                ///< Camera to the data set's world, in its unit (metres for drives).
 };
@@ -23,13 +24,14 @@ struct DatasetFrame {
 /// A recorded drive with known camera poses: a folder with `frames.txt` (one image file a line),
 /// `poses_tum.txt` (`time_s tx ty tz qx qy qz qw`, line i for image i), `intrinsics.txt`
 /// (`fx fy cx cy width height [k1 k2 p1 p2 [k3]]`) and the images. `#` starts a comment.
+/// Depth images, where there are any, are `depth/NAME.png` for the image `FOLDER/NAME.jpg`.
 struct Dataset {
   std::string directory;
   CameraIntrinsics intrinsics;
   std::vector<DatasetFrame> frames;
 };
 
-/// Reads the three text files; the images are not opened.
+/// Reads the three text files; the images are not opened, only which have a depth image is seen.
 ///
 /// @return kInvalidInput with file and line, kUnavailable when a file cannot be read.
 Result<Dataset> ReadDataset(const std::string& directory);

@@ -113,6 +113,14 @@ class Preparation {
     return GradientHistograms::Create(features_).value();  // checked before
   }
   [[nodiscard]] std::vector<BaseCells> MeasureChunk(std::size_t chunk) const;
+  /// Of the depth image; 0 where it says nothing.
+  [[nodiscard]] std::vector<float> GivenDepths(std::size_t image,
+                                               const GradientHistograms& extractor,
+                                               const std::vector<Eigen::Vector2f>& pixels) const;
+  void FindMissingDepths(std::size_t image,
+                         std::size_t first,
+                         const std::vector<std::unique_ptr<GradientHistograms>>& extractors,
+                         BaseCells& base) const;
   [[nodiscard]] std::vector<float> Depths(
       std::size_t image,
       std::size_t first,
@@ -157,11 +165,38 @@ std::vector<BaseCells> Preparation::MeasureChunk(std::size_t chunk) const {
   }
   for (std::size_t image = begin; image < end; ++image) {
     BaseCells& base = bases[image - begin];
-    base.inverse_depths = config_.measure_depth
-                              ? Depths(image, first, extractors, base.working_pixels)
-                              : std::vector<float>(base.working_pixels.size(), 0.0F);
+    base.inverse_depths = GivenDepths(image, *extractors.front(), base.working_pixels);
+    if (config_.measure_depth) FindMissingDepths(image, first, extractors, base);
   }
   return bases;
+}
+
+std::vector<float> Preparation::GivenDepths(std::size_t image,
+                                            const GradientHistograms& extractor,
+                                            const std::vector<Eigen::Vector2f>& pixels) const {
+  std::vector<float> inverse_depths;
+  inverse_depths.reserve(pixels.size());
+  for (const Eigen::Vector2f& pixel : pixels) {
+    inverse_depths.push_back(
+        MeasuredInverseDepth(images_[image].depth, extractor.FromWorking(pixel)));
+  }
+  return inverse_depths;
+}
+
+void Preparation::FindMissingDepths(
+    std::size_t image,
+    std::size_t first,
+    const std::vector<std::unique_ptr<GradientHistograms>>& extractors,
+    BaseCells& base) const {
+  std::vector<Eigen::Vector2f> pixels;
+  for (std::size_t cell = 0; cell < base.working_pixels.size(); ++cell) {
+    if (base.inverse_depths[cell] == 0.0F) pixels.push_back(base.working_pixels[cell]);
+  }
+  const std::vector<float> found = Depths(image, first, extractors, pixels);
+  auto next = found.begin();
+  for (float& inverse_depth : base.inverse_depths) {
+    if (inverse_depth == 0.0F) inverse_depth = *next++;
+  }
 }
 
 std::vector<float> Preparation::Depths(
@@ -365,6 +400,20 @@ Result<void> CheckImage(const GrayImage& image,
                            features.image_height)};
 }
 
+Result<void> CheckDepth(const MeasuredDepth& depth,
+                        std::size_t index,
+                        const GradientHistogramsConfig& features) {
+  if (depth.depth_mm.empty()) return {};
+  if (depth.width == features.image_width && depth.height == features.image_height) return {};
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("depth of training image {} is {} x {} pixels, must be {} x {}",
+                           index,
+                           depth.width,
+                           depth.height,
+                           features.image_width,
+                           features.image_height)};
+}
+
 }  // namespace
 
 Result<FeatureWhitening> FitWhiteningToImages(const std::vector<GrayImage>& images,
@@ -404,6 +453,7 @@ Result<TrainingSet> PrepareTraining(const std::vector<TrainingImage>& images,
   }
   for (std::size_t index = 0; index < images.size(); ++index) {
     if (auto valid = CheckImage(images[index].image, index, features); !valid) return valid.error();
+    if (auto valid = CheckDepth(images[index].depth, index, features); !valid) return valid.error();
   }
   return Preparation(images, camera, features, whitening, config).Run(progress);
 }

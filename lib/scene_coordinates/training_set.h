@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "camera/image.h"
+#include "camera/measured_depth.h"
 #include "camera/pinhole_camera.h"
 #include "core/result.h"
 #include "features/feature_whitening.h"
@@ -20,7 +21,8 @@ namespace relocd {
 struct TrainingImage {
   GrayImage image;
   Pose3 X_WC;
-  int drive = 0;  ///< Depths are looked for between images of one drive, in one light.
+  int drive = 0;          ///< Depths are looked for between images of one drive, in one light.
+  MeasuredDepth depth{};  ///< Of the image's size, or empty: then all depths are looked for.
 };
 
 /// Where a training cell looks.
@@ -48,7 +50,7 @@ struct TrainingSetConfig {
   double max_roll_rad = 0.12;  ///< >= 0
   double max_blur_px = 1.2;    ///< >= 0; standard deviation in working pixels.
   LightChanges light;          ///< Of the copies.
-  bool measure_depth = true;   ///< Find depths between neighbouring images by their poses.
+  bool measure_depth = true;   ///< Find depths that were not given, by neighbouring images.
   std::uint64_t seed = 1;
   int threads = 1;  ///< > 0; the result does not depend on it.
 };
@@ -66,7 +68,7 @@ Result<FeatureWhitening> FitWhiteningToImages(const std::vector<GrayImage>& imag
 /// thread at a time.
 ///
 /// @param whitening  of this extractor's features.
-/// @return kInvalidInput when an image has not the configured size.
+/// @return kInvalidInput when an image, or its depth, has not the configured size.
 Result<TrainingSet> PrepareTraining(const std::vector<TrainingImage>& images,
                                     const PinholeCamera& camera,
                                     const GradientHistogramsConfig& features,

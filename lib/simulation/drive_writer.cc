@@ -143,6 +143,10 @@ std::string DriveImageName(std::size_t index) {
   return fmt::format("images/{:06}.jpg", index);
 }
 
+std::string DriveDepthName(std::size_t index) {
+  return fmt::format("depth/{:06}.png", index);
+}
+
 Result<void> DriveWriter::Check(const std::string& folder) {
   const std::string name = WithoutSlash(folder);
   const std::string partial = PartialOf(name);
@@ -206,6 +210,15 @@ Result<void> DriveWriter::AddImage(std::span<const std::uint8_t> jpeg) {
   if (auto ok = Explain(WriteFile(path, {bytes, jpeg.size()})); !ok) return ok;
   if (auto ok = Explain(LogCanBefore(record_.X_WCs[images_].time_ns)); !ok) return ok;
   return Explain(LogImage(jpeg));
+}
+
+Result<std::string> DriveWriter::MakeDepthPath() const {
+  RELOCD_CHECK(images_ > 0, "a depth image comes after its image");
+  const std::string folder = partial_ + "/depth";
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return Incomplete(FileSystemError(fmt::format("creating {}", folder), error));
+  return fmt::format("{}/{}", partial_, DriveDepthName(images_ - 1));
 }
 
 Result<void> DriveWriter::LogImage(std::span<const std::uint8_t> jpeg) {

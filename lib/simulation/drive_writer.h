@@ -49,6 +49,9 @@ class DriveWriter {
   /// The next image.
   Result<void> AddImage(std::span<const std::uint8_t> jpeg);
 
+  /// Where the depth image of the last one is to be written.
+  Result<std::string> MakeDepthPath() const;
+
   /// To be called when all images are there: writes the rest, and gives the folder its name.
   Result<void> Finish();
 
@@ -74,7 +77,8 @@ class DriveWriter {
   std::int64_t can_batches_ = 0;
 };
 
-/// The file of an image, relative to the folder.
+/// The file of an image, and of its depth image, relative to the folder.
 std::string DriveImageName(std::size_t index);
+std::string DriveDepthName(std::size_t index);
 
 }  // namespace relocd

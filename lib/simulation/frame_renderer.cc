@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -120,6 +121,23 @@ RgbImage FrameRenderer::Render(std::int64_t time_ns, const CameraMotion& camera_
   self.lens.Apply(radiance, time_s, seed);
   return self.sensor.Develop(
       radiance, self.exposure.Next(radiance, time_s), seed + 1, self.options.threads);
+}
+
+MeasuredDepth FrameRenderer::RenderDepth(std::int64_t time_ns, const CameraMotion& camera_motion) {
+  constexpr float kMillimetres = 1000.0F;
+  constexpr float kMost_mm = std::numeric_limits<std::uint16_t>::max();
+  Implementation& self = *implementation_;
+  const double time_s = static_cast<double>(time_ns) * 1e-9;
+  self.tracer->SetMoving(self.actors.During(time_s, time_s));
+  const DepthImage image = self.renderer->RenderDepth(camera_motion(time_ns));
+  MeasuredDepth depth{.width = image.width, .height = image.height, .depth_mm = {}};
+  depth.depth_mm.reserve(image.depths_m.size());
+  for (const float depth_m : image.depths_m) {
+    const float depth_mm = kMillimetres * depth_m;
+    const bool is_known = depth_mm > 0.0F && depth_mm < kMost_mm;  // false for what is no number
+    depth.depth_mm.push_back(is_known ? static_cast<std::uint16_t>(depth_mm) : std::uint16_t{0});
+  }
+  return depth;
 }
 
 }  // namespace relocd

@@ -6,6 +6,7 @@
 
 #include "camera/image.h"
 #include "camera/intrinsics.h"
+#include "camera/measured_depth.h"
 #include "core/result.h"
 #include "geometry/pose3.h"
 #include "simulation/session.h"
@@ -46,6 +47,9 @@ class FrameRenderer {
   /// @param time_ns  the middle of the exposure of the middle row, since the drive's begin. Frames
   ///                 come in the order of their times: the exposure follows what was seen before.
   RgbImage Render(std::int64_t time_ns, const CameraMotion& camera_motion);
+
+  /// What an ideal depth camera sees at that time, up to 65 m: without exposure, noise or rain.
+  MeasuredDepth RenderDepth(std::int64_t time_ns, const CameraMotion& camera_motion);
 
  private:
   FrameRenderer();

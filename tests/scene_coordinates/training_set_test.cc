@@ -1,5 +1,8 @@
 #include "scene_coordinates/training_set.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <vector>
 
@@ -55,6 +58,60 @@ TEST(TrainingSetTest, KnowsWhereEachCellLooksAlsoInChangedCopies) {
   }
   EXPECT_GT(known, static_cast<int>(set->targets.size()) / 3);
   EXPECT_GT(right, known * 8 / 10);
+}
+
+/// As a depth camera would see the wall, but for its left third.
+MeasuredDepth DepthOfWall(const Pose3& X_WC) {
+  const PinholeCamera camera(WallScene::Intrinsics());
+  MeasuredDepth depth{.width = WallScene::kWidth, .height = WallScene::kHeight, .depth_mm = {}};
+  for (int v = 0; v < WallScene::kHeight; ++v) {
+    for (int u = 0; u < WallScene::kWidth; ++u) {
+      const double depth_m = WallScene::Depth(X_WC, *camera.Unproject({u, v}));
+      depth.depth_mm.push_back(
+          u < WallScene::kWidth / 3 ? 0 : static_cast<std::uint16_t>(std::lround(1e3 * depth_m)));
+    }
+  }
+  return depth;
+}
+
+TEST(TrainingSetTest, DepthImagesSayWhereCellsLook) {
+  std::vector<TrainingImage> images = WallScene().Drive(4);
+  for (TrainingImage& image : images)
+    image.depth = DepthOfWall(image.X_WC);
+  TrainingSetConfig config = TestConfig();
+  config.measure_depth = false;
+  const auto given = Prepare(images, Whitening(images), config);
+  ASSERT_TRUE(given) << given.error().message;
+  const double left = (WallScene::kWidth / 3.0 - WallScene::Intrinsics().cx) / 220.0;
+  int known = 0;
+  int right = 0;  // of the border
+  for (const TrainingTarget& target : given->targets) {
+    if (target.x > left + 0.05) ++right;
+    if (target.inverse_depth == 0.0F) continue;
+    ++known;
+    EXPECT_GT(target.x, left - 0.05);
+    const double depth_m = WallScene::Depth(images[target.image].X_WC, {target.x, target.y});
+    EXPECT_NEAR(depth_m * static_cast<double>(target.inverse_depth), 1.0, 0.02);
+  }
+  EXPECT_GT(known, right * 8 / 10);
+
+  config.measure_depth = true;  // what the depth camera does not know is looked for
+  const auto found = Prepare(images, Whitening(images), config);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_GT(std::count_if(found->targets.begin(),
+                          found->targets.end(),
+                          [&](const TrainingTarget& target) {
+                            return target.inverse_depth != 0.0F && target.x < left - 0.05;
+                          }),
+            50);
+}
+
+TEST(TrainingSetTest, RefusesADepthImageOfAnotherSize) {
+  std::vector<TrainingImage> images = WallScene().Drive(4);
+  images[2].depth = {.width = 2, .height = 1, .depth_mm = {1000, 1000}};
+  const auto set = Prepare(images, Whitening(images), TestConfig());
+  ASSERT_FALSE(set);
+  EXPECT_EQ(set.error().message, "depth of training image 2 is 2 x 1 pixels, must be 240 x 160");
 }
 
 TEST(TrainingSetTest, TheNumberOfThreadsDoesNotChangeTheSet) {

@@ -1,14 +1,21 @@
 #include "input_check.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <numeric>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "camera/measured_depth.h"
+#include "camera/pinhole_camera.h"
+#include "core/file.h"
+#include "depth_file.h"
 #include "support/random.h"
 #include "wall_drive.h"
 
@@ -337,6 +344,58 @@ TEST(InputCheckTest, RefusesImagesThatAreMissingOrBrokenOrOfAnotherSize) {
             HasSubstr("refused: images: 1 of 44 images cannot be read (images/08.jpg: "),
             HasSubstr("refused: size: 1 of 44 images are (images/09.jpg) 120 x 80 pixels, must be "
                       "240 x 160 as intrinsics.txt says")));
+}
+
+/// Depth images of frames 0, 2, 4, ..., in this unit.
+void AddDepth(WallDrive& drive, double units_per_m) {
+  const PinholeCamera camera(WallScene::Intrinsics());
+  std::filesystem::create_directories(drive.folder().path() + "/depth");
+  for (DatasetFrame& frame : drive.dataset().frames) {
+    if (frame.index % 2 == 1) continue;
+    MeasuredDepth depth{.width = WallScene::kWidth, .height = WallScene::kHeight, .depth_mm = {}};
+    for (int v = 0; v < WallScene::kHeight; ++v) {
+      for (int u = 0; u < WallScene::kWidth; ++u) {
+        const double depth_m = WallScene::Depth(frame.X_WC, *camera.Unproject({u, v}));
+        depth.depth_mm.push_back(static_cast<std::uint16_t>(std::lround(units_per_m * depth_m)));
+      }
+    }
+    frame.depth_path = fmt::format("{}/depth/{:02}.png", drive.folder().path(), frame.index);
+    ASSERT_TRUE(WriteDepthFile(frame.depth_path, depth));
+  }
+}
+
+TEST(InputCheckTest, HoldsDepthImagesAgainstThePoses) {
+  WallDrive drive;
+  AddDepth(drive, 1000.0);
+  const InputCheck check = Check(drive);
+  EXPECT_FALSE(check.IsRefused()) << Text(check);
+  EXPECT_NEAR(check.summary.depth_factor.value_or(0.0), 1.0, 0.03);
+  EXPECT_THAT(Text(check),
+              AllOf(HasSubstr("times as far in the depth images"),
+                    HasSubstr("warning: depth: 22 of 44 images have no depth image in depth/ "
+                              "(images/01.jpg, images/03.jpg, ")));
+}
+
+TEST(InputCheckTest, RefusesDepthImagesInAnotherUnit) {
+  WallDrive drive;
+  AddDepth(drive, 5000.0);
+  const InputCheck check = Check(drive);
+  EXPECT_NEAR(check.summary.depth_factor.value_or(0.0), 5.0, 0.15);
+  EXPECT_THAT(Text(check), HasSubstr("times as far in the depth images as by the poses, at "));
+  EXPECT_TRUE(check.IsRefused());
+}
+
+TEST(InputCheckTest, RefusesDepthImagesThatAreNone) {
+  WallDrive drive;
+  AddDepth(drive, 1000.0);
+  drive.folder().Write("depth/00.png", "no image");
+  EXPECT_THAT(
+      Text(Check(drive)),
+      AllOf(HasSubstr("refused: depth: "),
+            HasSubstr("/depth/00.png: cannot be read as an image, must be a PNG file of 240 "
+                      "x 160 pixels with one channel of 16 bits, depth in mm")));
+  drive.folder().Write("depth/00.png", ReadFile(drive.dataset().frames[0].image_path).value());
+  EXPECT_THAT(Text(Check(drive)), HasSubstr("/depth/00.png: has 1 channels of 8 bits, must be"));
 }
 
 TEST(InputCheckTest, RefusesTooFewFrames) {

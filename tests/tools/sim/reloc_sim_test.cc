@@ -4,17 +4,20 @@
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include "camera/dataset.h"
 #include "camera/jpeg.h"
+#include "camera/measured_depth.h"
 #include "can/candump_log.h"
 #include "can/socket_can_source.h"
 #include "config/config.h"
 #include "core/csv.h"
 #include "core/file.h"
+#include "depth_file.h"
 #include "odometry/wheel_odometry.h"
 #include "recording/log_reader.h"
 #include "support/run_program.h"
@@ -66,6 +69,24 @@ TEST_F(RelocSimTest, RendersADriveIntoADataSet) {
   EXPECT_THAT(session, HasSubstr("session: evening+wet\n"));
   EXPECT_THAT(session, HasSubstr("command: reloc sim --vehicle "));
   EXPECT_FALSE(Exists(out_ + ".partial"));
+}
+
+TEST_F(RelocSimTest, WritesDepthImagesOfWhatTheImagesShow) {
+  constexpr double kCameraHeightM = 1.65;  // as the vehicle's file has it
+  const Ended ended = RunTool(DriveArguments("--depth"));
+  ASSERT_EQ(ended.exit_code, 0) << ended.output;
+  const auto dataset = ReadDataset(out_);
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  for (const DatasetFrame& frame : dataset->frames) {
+    ASSERT_EQ(frame.depth_path, fmt::format("{}/depth/{:06}.png", out_, frame.index));
+    const auto depth = ReadDepthFile(frame.depth_path, 64, 48);
+    ASSERT_TRUE(depth) << depth.error().message;
+    // The road below the camera, in the picture's two lowest rows.
+    const float inverse_depth = MeasuredInverseDepth(*depth, {32.0F, 47.0F});
+    ASSERT_GT(inverse_depth, 0.0F);
+    const double down = (46.5 - dataset->intrinsics.cy) / dataset->intrinsics.fy;
+    EXPECT_NEAR(down / static_cast<double>(inverse_depth), kCameraHeightM, 0.1);
+  }
 }
 
 TEST_F(RelocSimTest, TheCopiedVehicleDecodesTheFrames) {
