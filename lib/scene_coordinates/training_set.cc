@@ -311,6 +311,10 @@ void Preparation::AppendView(ViewState& state,
 
 ViewCells Preparation::MakeViews(ViewState& state, std::size_t image, const BaseCells& base) const {
   ViewCells out;
+  const auto most = static_cast<std::size_t>(config_.views_per_image) *
+                    static_cast<std::size_t>(config_.cells_per_view);
+  out.targets.reserve(most);
+  out.features.reserve(most * static_cast<std::size_t>(whitening_.outputs));
   std::seed_seq seeds{static_cast<std::uint32_t>(config_.seed),
                       static_cast<std::uint32_t>(config_.seed >> 32U),
                       static_cast<std::uint32_t>(image)};
