@@ -172,6 +172,20 @@ Result<std::vector<double>> KittiNumbers(std::string_view line, const std::strin
       fmt::format("{}: has {} numbers, must have {}", where, numbers.size(), kKittiNumbers)};
 }
 
+/// Whether they are of another layout: the third column is an axis of the camera.
+Result<void> CheckKittiAxis(const std::vector<double>& numbers, const std::string& where) {
+  constexpr double kTolerance = 1e-3;
+  const double length = std::hypot(numbers[2], numbers[6], numbers[10]);
+  if (std::abs(length - 1.0) < kTolerance) return {};
+  return Error{ErrorKind::kInvalidInput,
+               fmt::format("{}: the camera's axis ({}, {}, {}) has the length {}, must have 1",
+                           where,
+                           numbers[2],
+                           numbers[6],
+                           numbers[10],
+                           length)};
+}
+
 /// The path in the ground plane: the camera looks along z, x is to its right.
 Result<void> ImportKitti(const KittiOptions& options) {
   if (!(options.rate_hz > 0.0 && std::isfinite(options.rate_hz))) {
@@ -180,13 +194,18 @@ Result<void> ImportKitti(const KittiOptions& options) {
   }
   const auto text = ReadFile(options.poses);
   if (!text) return text.error();
+  if (Trim(*text).empty()) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("{}: has no lines, must have at least one", options.poses)};
+  }
   std::string out = "t_s,x_m,y_m,theta_rad\n";
   std::string_view rest = *text;
   for (int row = 0; !rest.empty(); ++row) {
     const std::size_t end = std::min(rest.find('\n'), rest.size());
-    const auto numbers =
-        KittiNumbers(rest.substr(0, end), fmt::format("{}: line {}", options.poses, row + 1));
+    const std::string where = fmt::format("{}: line {}", options.poses, row + 1);
+    const auto numbers = KittiNumbers(rest.substr(0, end), where);
     if (!numbers) return numbers.error();
+    if (auto ok = CheckKittiAxis(*numbers, where); !ok) return ok;
     const std::vector<double>& n = *numbers;
     out +=
         fmt::format("{},{},{},{}\n", row / options.rate_hz, n[11], -n[3], std::atan2(-n[2], n[10]));

@@ -47,6 +47,10 @@ Result<Trajectory2> ReadTruth(const std::string& path) {
     }
     X_WBs.push_back({.time_ns = *time_ns, .X_WB = Pose2(cells[0], cells[1], cells[2])});
   }
+  if (X_WBs.empty()) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("{}: has no rows, must have at least one", path)};
+  }
   return X_WBs;
 }
 
