@@ -182,6 +182,7 @@ NodeStatus OdometryNode::Status(const ClockReading& now) const {
   add("slips", counts.slips);
   add("guesses", counts.guesses);
   add("out_of_order", counts.out_of_order);
+  add("clock_jumps", counts.clock_jumps);
   add("bad_checksums", frames.bad_checksums);
   add("stuck_counters", frames.stuck_counters);
   add("short_frames", frames.short_frames);

@@ -106,6 +106,14 @@ std::optional<TurnMeasurement> YawRateSensor::TurnTo(MonotonicTime time) {
                          .variance_rad2 = Square(config_.scale) * variance};
 }
 
+void YawRateSensor::Restart() {
+  const double bias_radps = bias_radps_;
+  const double bias_variance = bias_variance_;
+  *this = YawRateSensor(config_, resolution_radps_, max_age_);
+  bias_radps_ = bias_radps;
+  bias_variance_ = bias_variance;
+}
+
 void YawRateSensor::LearnBias() {
   if (!last_rate_radps_ || last_duration_s_ <= 0.0) return;
   const double variance = Square(config_.noise_rad_per_sqrt_s) / last_duration_s_;

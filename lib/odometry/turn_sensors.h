@@ -92,6 +92,9 @@ class YawRateSensor {
   /// missing meanwhile.
   std::optional<TurnMeasurement> TurnTo(MonotonicTime time);
 
+  /// Times go on elsewhere, as after a jump of the clock: forgets all but the bias.
+  void Restart();
+
   /// The wheels stood in the interval of the last TurnTo.
   void LearnBias();
 

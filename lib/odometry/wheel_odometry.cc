@@ -18,6 +18,9 @@ constexpr double kAxleDifference = 0.5;  // m/s
 /// measurements that are not of the same time.
 constexpr double kAgreementS = 0.5;
 constexpr double kAgreementRad = 0.01;
+/// So many sets of measurements in a row that are older than the last one, but rise: the clock has
+/// jumped back, or the last one was of a wrong time.
+constexpr int kOldAreNew = 100;
 
 double Square(double value) {
   return value * value;
@@ -164,10 +167,8 @@ std::optional<OdometryIncrement> WheelOdometry::Handle(const CanFrame& frame) {
   if (sample.refused_frames > 0) pending_flags_ |= kOdometryChecksum;
   if (sample.missing_frames > 0) pending_flags_ |= kOdometryGap;
   if (!anchor_) return Begin(sample);
-  if (sample.time <= anchor_->sample.time) {
-    ++counters_.out_of_order;
-    return std::nullopt;
-  }
+  if (sample.time <= anchor_->sample.time) return HandleOld(sample);
+  old_in_a_row_ = 0;
 
   const double duration_s = ToSeconds(sample.time - anchor_->sample.time);
   if (IsAmbiguous(duration_s)) {
@@ -186,8 +187,25 @@ std::optional<OdometryIncrement> WheelOdometry::Handle(const CanFrame& frame) {
   return std::nullopt;
 }
 
+std::optional<OdometryIncrement> WheelOdometry::HandleOld(const WheelSample& sample) {
+  ++counters_.out_of_order;
+  old_in_a_row_ = sample.time > last_old_time_ ? old_in_a_row_ + 1 : 1;
+  last_old_time_ = sample.time;
+  if (old_in_a_row_ < kOldAreNew) return std::nullopt;
+  ++counters_.clock_jumps;
+  old_in_a_row_ = 0;
+  suspect_.reset();
+  still_since_.reset();
+  is_guess_ = false;
+  guessed_covariance_.setZero();
+  disagreement_rad_ = disagreement_variance_ = 0.0;
+  if (yaw_rate_) yaw_rate_->Restart();
+  pending_flags_ |= kOdometryJump;
+  return Begin(sample);
+}
+
 OdometryIncrement WheelOdometry::Begin(const WheelSample& sample) {
-  Anchor anchor{.sample = sample};
+  Anchor anchor{.sample = sample, .X_OB = X_OB_};
   if (signals_.are_ticks()) {
     for (std::size_t i = 0; i < 2; ++i)
       anchor.ticks.at(i) = static_cast<std::int64_t>(sample.ticks.at(i));

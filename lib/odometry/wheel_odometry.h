@@ -122,7 +122,8 @@ struct OdometryIncrement {
 /// Increments follow each other without a hole: composed, they give X_OB. While no measurement
 /// comes, Tick guesses increments whose covariance grows fast; the first measurement after that
 /// takes back what the guesses had wrong (ticks also tell how far the wheels went meanwhile), with
-/// a covariance that covers it.
+/// a covariance that covers it. Measurements that go on at an earlier time, as those of another
+/// boot, are refused as out of order, until there are so many that it begins anew with them.
 ///
 /// Thread-bound; reads no clock.
 class WheelOdometry {
@@ -159,6 +160,7 @@ class WheelOdometry {
     std::int64_t jumps = 0;         ///< Sets refused as implausible.
     std::int64_t slips = 0;         ///< Increments of slipping wheels.
     std::int64_t out_of_order = 0;  ///< Sets refused, since their time did not increase.
+    std::int64_t clock_jumps = 0;   ///< The measurements went on at an earlier time: began anew.
     std::int64_t guesses = 0;       ///< Increments made by Tick.
   };
   [[nodiscard]] const Counters& counters() const { return counters_; }
@@ -183,6 +185,7 @@ class WheelOdometry {
   }
 
   OdometryIncrement Begin(const WheelSample& sample);
+  std::optional<OdometryIncrement> HandleOld(const WheelSample& sample);
   std::optional<OdometryIncrement> Accept(const WheelSample& sample, const WheelTravel& travel);
   void MoveAnchor(const WheelSample& sample, const WheelTravel& travel, const Pose2& X_BiBj);
   OdometryIncrement Publish(MonotonicTime time, const BodyMotion& motion, std::int32_t flags);
@@ -232,6 +235,8 @@ class WheelOdometry {
   std::optional<WheelSample> last_sample_;
   std::optional<Anchor> anchor_;
   std::optional<WheelSample> suspect_;  ///< The last set that was refused as a jump.
+  MonotonicTime last_old_time_{};       ///< Of the last set that was refused as out of order.
+  int old_in_a_row_ = 0;                ///< Of them, by rising time.
   std::optional<MonotonicTime> still_since_;
 
   MonotonicTime time_{};  ///< Of the last increment.

@@ -20,6 +20,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr std::int64_t kPeriodNs = 10'000'000;
+constexpr std::int64_t kHourNs = 3'600'000'000'000;
 
 /// One tick is one millimetre.
 OdometryConfig TicksConfig() {
@@ -200,6 +201,58 @@ TEST_F(WheelOdometryTest, RefusesTimesThatDoNotIncrease) {
   ticks_.count = 9;
   EXPECT_FALSE(odometry_.Handle(Frame()));
   EXPECT_EQ(odometry_.counters().out_of_order, 1);
+}
+
+TEST_F(WheelOdometryTest, AClockThatJumpsBackByHoursIsFollowed) {
+  ticks_.time_ns = 3 * kHourNs;
+  Drive(0, 0);
+  Drive(10, 10);
+  ticks_.time_ns -= 2 * kHourNs;
+  for (int i = 0; i < 99; ++i)
+    EXPECT_FALSE(Drive(10, 10)) << i;
+  const auto anew = Drive(10, 10);
+  ASSERT_TRUE(anew);
+  EXPECT_EQ(anew->flags, kOdometryJump);
+  EXPECT_EQ(anew->time, anew->previous_time);
+  EXPECT_NEAR(anew->X_OB.x(), 0.01, 1e-12);  // what was driven meanwhile is not known
+  EXPECT_TRUE(IsCovariance(anew->covariance));
+  const auto next = Drive(10, 10);
+  ASSERT_TRUE(next);
+  EXPECT_EQ(next->flags, 0);
+  EXPECT_NEAR(next->X_OB.x(), 0.02, 1e-12);
+  EXPECT_EQ(odometry_.counters().out_of_order, 100);
+  EXPECT_EQ(odometry_.counters().clock_jumps, 1);
+}
+
+TEST_F(WheelOdometryTest, OneFrameFromHoursAheadDoesNotSilenceTheOthersForGood) {
+  Drive(0, 0);
+  Drive(10, 10);
+  ticks_.time_ns += 5 * kHourNs;
+  const auto ahead = Drive(10, 10);
+  ASSERT_TRUE(ahead);
+  EXPECT_NE(ahead->flags & kOdometryGap, 0);
+  EXPECT_TRUE(IsCovariance(ahead->covariance));
+  ticks_.time_ns -= 5 * kHourNs;
+  int increments = 0;
+  for (int i = 0; i < 150; ++i)
+    increments += Drive(10, 10) ? 1 : 0;
+  EXPECT_EQ(increments, 51);
+  EXPECT_EQ(odometry_.counters().clock_jumps, 1);
+}
+
+TEST_F(WheelOdometryTest, OldFramesAmongNewOnesAreNoJumpOfTheClock) {
+  Drive(0, 0);
+  const std::int64_t old_ns = ticks_.time_ns;
+  for (int i = 1; i <= 300; ++i) {
+    EXPECT_TRUE(Drive(10, 10));
+    WheelTicks late = ticks_;
+    late.time_ns = old_ns - 1000 + i;
+    late.count = (late.count + 8) & 0xFU;
+    EXPECT_FALSE(odometry_.Handle(WheelTicksFrame(dbc_, late)));
+    ticks_.count = late.count;
+  }
+  EXPECT_EQ(odometry_.counters().out_of_order, 300);
+  EXPECT_EQ(odometry_.counters().clock_jumps, 0);
 }
 
 TEST_F(WheelOdometryTest, GuessesWhileNothingComesAndTakesTheErrorBack) {
@@ -415,6 +468,8 @@ class CarTest {
     }
   }
 
+  void JumpBack(double seconds) { time_ns_ -= static_cast<std::int64_t>(1e9 * seconds); }
+
   /// Distance and heading from the truth.
   [[nodiscard]] Eigen::Vector2d Error() const {
     const Pose2 error = X_WB_.Inverse() * last_.X_OB;
@@ -474,6 +529,17 @@ TEST(CarYawRateTest, LearnsTheBiasWhileItStandsAndFollows) {
   car.Drive(0.0, 0.0, 3.0);
   EXPECT_NEAR(car.odometry().yaw_rate_bias_radps().value(), CarTest::kBias, 2e-4);
   EXPECT_EQ(car.last().flags, kOdometryStandstill);
+  car.Drive(5.0, 0.3, 5.0);
+  EXPECT_LT(car.Error()[1], 0.01);
+}
+
+TEST(CarYawRateTest, KeepsItsBiasWhenTheClockJumpsBack) {
+  CarTest car(WithYawRate(CarConfig("differential")));
+  car.Drive(0.0, 0.0, 10.0);
+  car.JumpBack(8.0);
+  car.Drive(0.0, 0.0, 1.0);  // until it is believed
+  EXPECT_EQ(car.odometry().counters().clock_jumps, 1);
+  EXPECT_NEAR(car.odometry().yaw_rate_bias_radps().value(), CarTest::kBias, 2e-4);
   car.Drive(5.0, 0.3, 5.0);
   EXPECT_LT(car.Error()[1], 0.01);
 }

@@ -36,6 +36,14 @@ OdometryConfig TicksConfig() {
   return config;
 }
 
+double ValueOf(const NodeStatus& status, const std::string& name) {
+  for (const StatusValue& value : status.values) {
+    if (value.name == name) return value.value;
+  }
+  ADD_FAILURE() << "STATUS has no " << name;
+  return 0.0;
+}
+
 class OdometryNodeTest : public testing::Test {
  protected:
   OdometryNodeTest() {
@@ -172,6 +180,22 @@ TEST_F(OdometryNodeTest, SaysWhatIsWrongWithTheBus) {
                         "type can restart-ms 100"));
   node_.HandleSourceError("can0: No such device");
   EXPECT_EQ(node_.Status(At(0)).message, "can0: No such device");
+}
+
+TEST_F(OdometryNodeTest, AClockThatJumpsBackIsFollowedCountedAndNamed) {
+  ticks_.time_ns = 7'200'000'000'000;
+  for (int i = 0; i < 10; ++i)
+    Send(node_, NextFrame());
+  ticks_.time_ns -= 3'600'000'000'000;
+  for (int i = 0; i < 200; ++i)
+    Send(node_, NextFrame());
+  ASSERT_EQ(odometry_.size(), 10U + 101U);
+  EXPECT_EQ(odometry_[10].flags, odometry_t::FLAG_JUMP);
+  EXPECT_EQ(odometry_[10].prev_mono_ns, odometry_[10].mono_ns);
+  const NodeStatus status = node_.Status(At(ticks_.time_ns));
+  EXPECT_EQ(ValueOf(status, "out_of_order"), 100.0);
+  EXPECT_EQ(ValueOf(status, "clock_jumps"), 1.0);
+  EXPECT_EQ(status.level, status_t::WARNING);
 }
 
 TEST_F(OdometryNodeTest, ABadChecksumIsFlaggedAndCounted) {
