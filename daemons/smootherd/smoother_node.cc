@@ -1,8 +1,10 @@
 #include "smootherd/smoother_node.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -43,16 +45,36 @@ constexpr double kOdometryTimeout = 1.0;  // s
 /// angle.
 constexpr double kSetSigma = 2.0;         // m
 constexpr double kSetHeadingSigma = 0.2;  // rad
+/// In metres, rad and seconds: beyond it is no measurement of a vehicle on the Earth.
+constexpr double kLargestNumber = 1e8;
 constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
 
 Pose2 X_OBOf(const odometry_t& message) {
   return {message.x_OB_m, message.y_OB_m, message.yaw_OB_rad};
 }
 
-bool IsFinite(const odometry_t& message) {
-  return std::isfinite(message.x_OB_m) && std::isfinite(message.y_OB_m) &&
-         std::isfinite(message.yaw_OB_rad) && std::isfinite(message.speed_mps) &&
-         std::isfinite(message.yaw_rate_radps);
+/// Whether it is finite, and stays so when it is squared and added up.
+bool IsSane(double number) {
+  return std::abs(number) <= kLargestNumber;
+}
+
+/// Whether differences of it with others do not overflow.
+bool IsSaneTime(std::int64_t mono_ns) {
+  constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / 4;
+  return mono_ns >= -kLatest && mono_ns <= kLatest;
+}
+
+bool IsSane(const odometry_t& message) {
+  const std::array numbers{message.dx_m,
+                           message.dy_m,
+                           message.dtheta_rad,
+                           message.x_OB_m,
+                           message.y_OB_m,
+                           message.yaw_OB_rad,
+                           message.speed_mps,
+                           message.yaw_rate_radps};
+  return IsSaneTime(message.mono_ns) && IsSaneTime(message.prev_mono_ns) &&
+         std::ranges::all_of(numbers, [](double number) { return IsSane(number); });
 }
 
 Eigen::Matrix3d CovarianceOf(const odometry_t& message) {
@@ -84,7 +106,7 @@ void SmootherNode::Restore(const SavedState& state, const std::string& boot_id) 
 
 void SmootherNode::Handle(const odometry_t& message) {
   ++counters_.odometry;
-  if (!IsFinite(message) || IsOld(message)) {
+  if (!IsSane(message) || IsOld(message)) {
     ++counters_.odometry_refused;
     return;
   }
@@ -243,7 +265,8 @@ std::optional<Fix> SmootherNode::ToFix(const camera_pose_t& message) {
   const Matrix6d covariance_WC = Eigen::Map<const Matrix6d>(message.covariance);  // symmetric
   constexpr double kUnitTolerance = 1e-3;
   const bool is_unit = std::abs(rotation.norm() - 1.0) < kUnitTolerance;
-  if (!is_unit || !translation.allFinite() || !IsCovariance(covariance_WC)) {
+  const bool is_somewhere = std::ranges::all_of(message.pos, [](double p) { return IsSane(p); });
+  if (!is_unit || !is_somewhere || !IsSaneTime(message.mono_ns) || !IsCovariance(covariance_WC)) {
     ++counters_.bad_pose;
     return std::nullopt;
   }
@@ -292,7 +315,8 @@ void SmootherNode::SetPose(const pose_t& message) {
   PlanarPose prior{.X_WB = Pose2(message.pos[0], message.pos[1], 2.0 * std::atan2(q[3], q[0]))};
   prior.covariance.diagonal() << kSetSigma * kSetSigma, kSetSigma * kSetSigma,
       kSetHeadingSigma * kSetHeadingSigma;
-  if (!last_odometry_ || !is_planar || !smoother_.Reset(prior)) {
+  const bool is_somewhere = IsSane(message.pos[0]) && IsSane(message.pos[1]);
+  if (!last_odometry_ || !is_planar || !is_somewhere || !smoother_.Reset(prior)) {
     ++counters_.poses_refused;
     return;
   }

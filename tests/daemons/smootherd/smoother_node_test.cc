@@ -461,6 +461,8 @@ TEST_F(SmootherNodeTest, RefusesToBeSetToWhatIsNoPose) {
   pose_t message = PoseMessage(Pose2());
   message.pos[1] = std::numeric_limits<double>::quiet_NaN();
   node_->SetPose(message);
+  message.pos[1] = 1e300;  // finite, and its square is not
+  node_->SetPose(message);
   message = PoseMessage(Pose2());
   message.orientation[0] = 0.0;  // no unit quaternion
   node_->SetPose(message);
@@ -468,7 +470,7 @@ TEST_F(SmootherNodeTest, RefusesToBeSetToWhatIsNoPose) {
   message.orientation[0] = 0.0;
   message.orientation[1] = 1.0;  // upside down
   node_->SetPose(message);
-  EXPECT_EQ(node_->counters().poses_refused, 4);
+  EXPECT_EQ(node_->counters().poses_refused, 5);
   EXPECT_EQ(node_->counters().poses_set, 0);
   EXPECT_EQ(localizations_.back().status, localization_t::OK);
 }
