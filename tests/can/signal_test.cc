@@ -73,8 +73,39 @@ INSTANTIATE_TEST_SUITE_P(
          {.start_bit = 7, .length = 64, .byte_order = kBig, .type = RawType::kDouble},
          {0xC0, 0x04, 0, 0, 0, 0, 0, 0},
          -2.5},
+        // 64 bits: what a double cannot tell apart is rounded, and no shift goes too far.
+        {"AllOf64Bits", {.start_bit = 0, .length = 64}, std::vector<std::uint8_t>(8, 0), 0.0},
+        {"HighestOf64Bits",
+         {.start_bit = 0, .length = 64},
+         {0, 0, 0, 0, 0, 0, 0, 0x80},
+         9223372036854775808.0},
+        {"BigEndian64Bits",
+         {.start_bit = 7, .length = 64, .byte_order = kBig},
+         {0x80, 0, 0, 0, 0, 0, 0, 0},
+         9223372036854775808.0},
+        {"MostNegativeOf64Bits",
+         {.start_bit = 0, .length = 64, .type = RawType::kSigned},
+         {0, 0, 0, 0, 0, 0, 0, 0x80},
+         -9223372036854775808.0},
+        {"MinusOneOf64Bits",
+         {.start_bit = 7, .length = 64, .byte_order = kBig, .type = RawType::kSigned},
+         std::vector<std::uint8_t>(8, 0xFF),
+         -1.0},
+        {"MostNegativeOf63Bits",
+         {.start_bit = 1, .length = 63, .type = RawType::kSigned},
+         {0, 0, 0, 0, 0, 0, 0, 0x80},
+         -4611686018427387904.0},
     }),
     [](const auto& instance) { return instance.param.name; });
+
+TEST(DecodeSignalTest, RoundsTheLargestOf64Bits) {
+  const std::vector<std::uint8_t> ones(8, 0xFF);
+  EXPECT_EQ(DecodeSignal({.start_bit = 0, .length = 64}, ones), 18446744073709551616.0);
+  EXPECT_EQ(DecodeBits({.start_bit = 0, .length = 64}, ones), ~std::uint64_t{0});
+  const std::vector<std::uint8_t> most{0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F};
+  EXPECT_EQ(DecodeSignal({.start_bit = 0, .length = 64, .type = RawType::kSigned}, most),
+            9223372036854775808.0);
+}
 
 TEST(DecodeSignalTest, HasNothingOfAShortPayload) {
   const std::vector<std::uint8_t> payload(3);
@@ -150,6 +181,27 @@ TEST(EncodeSignalTest, RefusesWhatTheSignalCannotHold) {
   EXPECT_FALSE(EncodeSignal(byte, -0.5, payload));
   EXPECT_FALSE(EncodeSignal(byte, std::nan(""), payload));
   EXPECT_THAT(payload, ElementsAre(0xFF));
+}
+
+/// A double next to the limit is the limit itself: no number may wrap.
+TEST(EncodeSignalTest, RefusesWhat64BitsCannotHold) {
+  std::array<std::uint8_t, 8> payload{};
+  const DbcSignal unsigned_signal{.name = "U", .start_bit = 0, .length = 64};
+  const DbcSignal signed_signal{
+      .name = "S", .start_bit = 0, .length = 64, .type = RawType::kSigned};
+  EXPECT_FALSE(EncodeSignal(unsigned_signal, 18446744073709551616.0, payload));
+  EXPECT_FALSE(EncodeSignal(unsigned_signal, -1.0, payload));
+  EXPECT_FALSE(EncodeSignal(signed_signal, 9223372036854775808.0, payload));
+  EXPECT_FALSE(EncodeSignal(signed_signal, -9223372036854777856.0, payload));
+  for (const double number : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    EXPECT_FALSE(EncodeSignal(unsigned_signal, number, payload));
+    EXPECT_FALSE(EncodeSignal(signed_signal, number, payload));
+  }
+  EXPECT_EQ(payload, (std::array<std::uint8_t, 8>{}));
+  ASSERT_TRUE(EncodeSignal(unsigned_signal, 18446744073709549568.0, payload));
+  EXPECT_EQ(DecodeSignal(unsigned_signal, payload), 18446744073709549568.0);
+  ASSERT_TRUE(EncodeSignal(signed_signal, 9223372036854774784.0, payload));
+  EXPECT_EQ(DecodeSignal(signed_signal, payload), 9223372036854774784.0);
 }
 
 }  // namespace
