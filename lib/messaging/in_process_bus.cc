@@ -11,19 +11,21 @@ Result<void> InProcessBus::PublishBytes(const std::string& channel,
 int InProcessBus::HandlePending() {
   int handled = 0;
   while (!events_.empty()) {
-    while (!events_.empty()) {
-      const Event event = std::move(events_.front());
-      events_.pop_front();
-      ++handled;
-      for (const auto& subscription : subscriptions()) {
-        if (Matches(subscription->pattern, event.channel)) {
-          subscription->Take(event.channel, event.bytes);
-        }
-      }
-    }
+    for (; !events_.empty(); ++handled)
+      HandOnFirst();
     HandOnNewest();
   }
   return handled;
+}
+
+void InProcessBus::HandOnFirst() {
+  const Event event = std::move(events_.front());
+  events_.pop_front();
+  for (const auto& subscription : subscriptions()) {
+    if (Matches(subscription->pattern, event.channel)) {
+      subscription->Take(event.channel, event.bytes);
+    }
+  }
 }
 
 }  // namespace relocd

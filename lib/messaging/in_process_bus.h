@@ -28,6 +28,8 @@ class InProcessBus final : public MessageBus {
     std::string channel;
     std::vector<std::uint8_t> bytes;
   };
+  void HandOnFirst();
+
   std::deque<Event> events_;
 };
 

@@ -53,8 +53,8 @@ std::map<std::string, ChannelCounters> MessageBus::counters() const {
 bool MessageBus::Matches(const std::string& pattern, const std::string& channel) {
   constexpr std::string_view kAnything = ".*";
   if (!pattern.ends_with(kAnything)) return pattern == channel;
-  return channel.starts_with(
-      std::string_view(pattern).substr(0, pattern.size() - kAnything.size()));
+  const std::string_view all = pattern;
+  return channel.starts_with(all.substr(0, all.size() - kAnything.size()));
 }
 
 }  // namespace relocd

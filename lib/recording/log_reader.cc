@@ -46,7 +46,10 @@ std::uint64_t LogReader::BigEndianAt(std::size_t offset, std::size_t size) const
 }
 
 std::optional<LogEvent> LogReader::ReadEvent() {
-  using namespace log_format;
+  using log_format::kHeaderSize;
+  using log_format::kMaxChannelSize;
+  using log_format::kMaxDataSize;
+  using log_format::kSyncWord;
   if (!Has(kHeaderSize) || BigEndianAt(0, kSyncSize) != kSyncWord) return std::nullopt;
   const std::size_t channel_size = BigEndianAt(20, 4);
   const std::size_t data_size = BigEndianAt(24, 4);

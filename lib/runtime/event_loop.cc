@@ -74,17 +74,20 @@ Result<void> EventLoop::Run() {
     const int count =
         ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), -1);
     if (count < 0 && errno != EINTR) return SystemError("waiting for events");
-    for (int i = 0; i < count && running_; ++i) {
-      const int fd = events.at(static_cast<std::size_t>(i)).data.fd;
-      if (fd == signals_.get()) {
-        signalfd_siginfo taken{};  // so that Run can be called again, to stop in an orderly way
-        static_cast<void>(::read(fd, &taken, sizeof(taken)));
-        return {};
-      }
-      handlers_.at(fd)();
-    }
+    for (int i = 0; i < count && running_; ++i)
+      HandleReadable(events.at(static_cast<std::size_t>(i)).data.fd);
   }
   return {};
+}
+
+void EventLoop::HandleReadable(int fd) {
+  if (fd != signals_.get()) {
+    handlers_.at(fd)();
+    return;
+  }
+  signalfd_siginfo taken{};  // so that Run can be called again, to stop in an orderly way
+  static_cast<void>(::read(fd, &taken, sizeof(taken)));
+  Stop();
 }
 
 }  // namespace relocd

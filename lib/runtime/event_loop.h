@@ -37,6 +37,8 @@ class EventLoop {
   EventLoop(UniqueFd epoll, UniqueFd signals)
       : epoll_(std::move(epoll)), signals_(std::move(signals)) {}
 
+  void HandleReadable(int fd);
+
   UniqueFd epoll_;
   UniqueFd signals_;
   std::map<int, UniqueFd> timers_;

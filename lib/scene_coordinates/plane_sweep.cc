@@ -35,6 +35,16 @@ Roots ReferenceRoots(const GradientMaps& maps, const Eigen::Vector2f& pixel) {
   return roots;
 }
 
+double AddAffinities(const GradientMaps& maps,
+                     const Roots& roots,
+                     const Eigen::Vector2f& place,
+                     double sum) {
+  for (int octave = 0; octave < kOctaves; ++octave) {
+    sum += maps.Affinity(octave, place.x(), place.y(), roots[static_cast<std::size_t>(octave)]);
+  }
+  return sum;
+}
+
 }  // namespace
 
 std::optional<Eigen::Vector2f> PlaneSweep::Project(const Ray& ray, double inverse_depth) const {
@@ -66,32 +76,37 @@ double PlaneSweep::WidestSweepPx(const std::vector<Ray>& rays) const {
   return widest_px;
 }
 
-float PlaneSweep::InverseDepth(const GradientMaps& reference,
-                               const std::vector<Ray>& rays,
-                               const Eigen::Vector2f& pixel) const {
+PlaneSweep::Sweep PlaneSweep::ScoreDepths(const GradientMaps& reference,
+                                          const std::vector<Ray>& rays,
+                                          const Eigen::Vector2f& pixel) const {
   const Roots roots = ReferenceRoots(reference, pixel);
   const int steps =
       std::clamp(static_cast<int>(WidestSweepPx(rays) / kStepPx), kMinSteps, kMaxSteps);
-  const double first = 1.0 / config_.max_depth_m;
-  const double step = (1.0 / config_.min_depth_m - first) / (steps - 1);
-  std::vector<double> scores(static_cast<std::size_t>(steps), 0.0);
+  Sweep sweep;
+  sweep.first = 1.0 / config_.max_depth_m;
+  sweep.step = (1.0 / config_.min_depth_m - sweep.first) / (steps - 1);
+  sweep.scores.resize(static_cast<std::size_t>(steps), 0.0);
   for (int index = 0; index < steps; ++index) {
-    const double inverse_depth = first + step * index;
+    const double inverse_depth = sweep.first + sweep.step * index;
     double sum = 0.0;
     int count = 0;
     for (const Ray& ray : rays) {
-      if (ray.baseline_m * inverse_depth * config_.min_depth_per_baseline > 1.0) continue;
+      if (IsTooNear(ray, inverse_depth)) continue;
       const auto place = Project(ray, inverse_depth);
       if (!place) continue;
-      for (int octave = 0; octave < kOctaves; ++octave) {
-        sum += ray.maps->Affinity(
-            octave, place->x(), place->y(), roots[static_cast<std::size_t>(octave)]);
-      }
+      sum = AddAffinities(*ray.maps, roots, *place, sum);
       ++count;
     }
-    if (count >= kMinNeighbours) scores[static_cast<std::size_t>(index)] = sum / (count * kOctaves);
+    if (count >= kMinNeighbours) {
+      sweep.scores[static_cast<std::size_t>(index)] = sum / (count * kOctaves);
+    }
   }
+  return sweep;
+}
 
+std::optional<double> PlaneSweep::FindPeak(const Sweep& sweep) const {
+  const std::vector<double>& scores = sweep.scores;
+  const auto steps = static_cast<int>(scores.size());
   const auto best_at = std::max_element(scores.begin(), scores.end());
   const auto best = static_cast<int>(best_at - scores.begin());
   double elsewhere = 0.0;
@@ -100,18 +115,21 @@ float PlaneSweep::InverseDepth(const GradientMaps& reference,
       elsewhere = std::max(elsewhere, scores[static_cast<std::size_t>(index)]);
     }
   }
-  if (*best_at < config_.min_affinity || *best_at - elsewhere < config_.min_peak) return 0.0F;
-  if (best == 0 || best == steps - 1) return 0.0F;
-  const double before = scores[static_cast<std::size_t>(best - 1)];
-  const double after = scores[static_cast<std::size_t>(best + 1)];
+  if (*best_at < config_.min_affinity || *best_at - elsewhere < config_.min_peak) {
+    return std::nullopt;
+  }
+  if (best == 0 || best == steps - 1) return std::nullopt;
+  const double before = *(best_at - 1);
+  const double after = *(best_at + 1);
   const double curvature = before - 2.0 * *best_at + after;
-  if (before == 0.0 || after == 0.0 || curvature > -1e-9) return 0.0F;
-  const double inverse_depth = first + step * (best + 0.5 * (before - after) / curvature);
+  if (before == 0.0 || after == 0.0 || curvature > -1e-9) return std::nullopt;
+  return sweep.first + sweep.step * (best + 0.5 * (before - after) / curvature);
+}
 
-  // How much a pixel in the neighbour that sees it best is worth, against what the trainer wants.
+bool PlaneSweep::IsPrecise(const std::vector<Ray>& rays, double inverse_depth, double step) const {
   double px_per_inverse_depth = 0.0;
   for (const Ray& ray : rays) {
-    if (ray.baseline_m * inverse_depth * config_.min_depth_per_baseline > 1.0) continue;
+    if (IsTooNear(ray, inverse_depth)) continue;
     const auto here = Project(ray, inverse_depth);
     const auto there = Project(ray, inverse_depth + step);
     if (!here || !there) continue;
@@ -122,8 +140,16 @@ float PlaneSweep::InverseDepth(const GradientMaps& reference,
       static_cast<double>(extractor_.config().working_width) / extractor_.config().image_width;
   const double wanted_px_per_inverse_depth =
       enlargement * camera_.intrinsics().fx * config_.disparity_baseline_m;
-  if (px_per_inverse_depth * config_.max_error_px < wanted_px_per_inverse_depth) return 0.0F;
-  return static_cast<float>(inverse_depth);
+  return px_per_inverse_depth * config_.max_error_px >= wanted_px_per_inverse_depth;
+}
+
+float PlaneSweep::InverseDepth(const GradientMaps& reference,
+                               const std::vector<Ray>& rays,
+                               const Eigen::Vector2f& pixel) const {
+  const Sweep sweep = ScoreDepths(reference, rays, pixel);
+  const auto inverse_depth = FindPeak(sweep);
+  if (!inverse_depth || !IsPrecise(rays, *inverse_depth, sweep.step)) return 0.0F;
+  return static_cast<float>(*inverse_depth);
 }
 
 std::vector<float> PlaneSweep::InverseDepths(

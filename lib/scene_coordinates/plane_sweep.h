@@ -63,6 +63,25 @@ class PlaneSweep {
     double baseline_m = 0.0;
   };
 
+  /// How well each of some inverse depths agrees with the neighbours: 0 where too few see it.
+  struct Sweep {
+    double first = 0.0;
+    double step = 0.0;
+    std::vector<double> scores;
+  };
+
+  [[nodiscard]] Sweep ScoreDepths(const GradientMaps& reference,
+                                  const std::vector<Ray>& rays,
+                                  const Eigen::Vector2f& pixel) const;
+  /// The inverse depth of the one peak, if there is one.
+  [[nodiscard]] std::optional<double> FindPeak(const Sweep& sweep) const;
+  /// Whether the neighbour that sees it best sees it well enough for what the trainer wants.
+  [[nodiscard]] bool IsPrecise(const std::vector<Ray>& rays,
+                               double inverse_depth,
+                               double step) const;
+  [[nodiscard]] bool IsTooNear(const Ray& ray, double inverse_depth) const {
+    return ray.baseline_m * inverse_depth * config_.min_depth_per_baseline > 1.0;
+  }
   [[nodiscard]] float InverseDepth(const GradientMaps& reference,
                                    const std::vector<Ray>& rays,
                                    const Eigen::Vector2f& pixel) const;

@@ -47,7 +47,10 @@ Result<void> ValidateNames(const SupervisionConfig& config) {
     return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
   };
   const auto daemons = Daemons(config);
-  for (const auto& [name, process] : config.others) {
+  for (const auto& other : config.others) {
+    // Not a structured binding: clang does not let a lambda use one.
+    const std::string& name = other.first;
+    const ProcessConfig& process = other.second;
     if (name.empty() || !std::all_of(name.begin(), name.end(), is_allowed)) {
       return Invalid(
           fmt::format("others: name is '{}', must be of letters, digits, _ and -", name));
@@ -65,18 +68,24 @@ Result<void> ValidateNames(const SupervisionConfig& config) {
   return {};
 }
 
-/// Each name that `after` gives is there, and none waits for itself in the end.
-Result<void> ValidateOrder(const std::map<std::string, const ProcessConfig*>& all) {
+/// Each name that `after` gives is there.
+Result<void> ValidateAfter(const std::map<std::string, const ProcessConfig*>& all) {
   for (const auto& [name, process] : all) {
-    for (const std::string& other : process->after) {
-      if (all.count(other) != 0) continue;
-      std::vector<std::string> names;
-      for (const auto& entry : all)
-        names.push_back(entry.first);
-      return Invalid(
-          fmt::format("{}.after names '{}', must be of {}", name, other, fmt::join(names, ", ")));
-    }
+    const std::vector<std::string>& after = process->after;
+    const auto unknown = std::ranges::find_if(
+        after, [&all](const std::string& other) { return all.count(other) == 0; });
+    if (unknown == after.end()) continue;
+    std::vector<std::string> names;
+    for (const auto& entry : all)
+      names.push_back(entry.first);
+    return Invalid(
+        fmt::format("{}.after names '{}', must be of {}", name, *unknown, fmt::join(names, ", ")));
   }
+  return {};
+}
+
+/// No one waits for itself in the end.
+Result<void> ValidateOrder(const std::map<std::string, const ProcessConfig*>& all) {
   // Takes away those that wait for nobody, until none is left; who is left then is in a circle.
   auto left = all;
   while (!left.empty()) {
@@ -221,6 +230,7 @@ Result<void> SupervisionConfig::Validate() const {
     }
   }
   const auto all = AllProcesses(*this);
+  if (auto ok = ValidateAfter(all); !ok) return ok;
   if (auto ok = ValidateOrder(all); !ok) return ok;
   return ValidateStopTime(all);
 }
