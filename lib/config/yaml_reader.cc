@@ -16,14 +16,15 @@ namespace {
 
 constexpr std::size_t kMaxFileSize = 1 << 20;
 
-Result<void> ApplyOverride(const std::string& text, YAML::Node root) {
+Result<void> ApplyOverride(const std::string& text, const YAML::Node& root) {
   const auto equals = text.find('=');
   if (equals == std::string::npos || equals == 0) {
     return Error{ErrorKind::kInvalidInput,
                  fmt::format("--set {}: must be as in odometry.track_m=0.5", text)};
   }
-  std::string_view keys = std::string_view(text).substr(0, equals);
-  YAML::Node node = root;
+  std::string_view keys = text;
+  keys = keys.substr(0, equals);
+  YAML::Node node = root;  // a handle: what is put into it is in the root
   while (true) {
     const auto dot = keys.find('.');
     const std::string key(keys.substr(0, dot));
