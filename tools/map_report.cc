@@ -127,7 +127,7 @@ std::string DescribeWeakStretch(const WeakStretch& stretch) {
 TrainingReport MakeTrainingReport(const TrainedMap& trained, const MapTrainingOptions& options) {
   TrainingReport report;
   report.datasets = trained.map.training.dataset;
-  report.how = fmt::format("{} iterations of {}, seed {}, {:.0f} s with {} threads",
+  report.how = fmt::format("{} iterations of {}, seed {}, {:.0f} s, threads: {}",
                            options.head.iterations,
                            options.head.batch,
                            options.seed,

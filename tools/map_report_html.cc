@@ -33,28 +33,49 @@ constexpr std::string_view kKey =
     "0.25 m<i style=\"background:#e6a01e\"></i>less than 1 m<i style=\"background:#d55e00\"></i>"
     "more<i style=\"background:#be1860\"></i>not found</p>\n";
 
+/// Errors of images that were not found would look like very good ones.
+std::string AccuracyCells(const PoseErrors& errors) {
+  if (errors.localized == 0) return "<td>–</td><td>–</td><td>–</td><td>–</td><td>–</td>";
+  constexpr double kDegrees = 57.29577951308232;
+  return fmt::format(
+      "<td>{:.3f}</td><td>{:.2f}</td><td>{:.3f}</td><td>{:.0f} %</td><td>{:.0f} %</td>",
+      errors.median_m,
+      errors.median_rad * kDegrees,
+      errors.p95_m,
+      100.0 * errors.within_1m,
+      100.0 * errors.within_95);
+}
+
+/// How good the map is, in a sentence.
+std::string Verdict(const PoseErrors& errors) {
+  if (errors.localized == 0) {
+    return fmt::format("None of {} held-out images is found.", errors.frames);
+  }
+  return fmt::format(
+      "{} of {} held-out images are found, with a median error of {:.3f} m (p95 {:.3f} m); {:.0f} "
+      "% of them are inside the reported 95 % region.",
+      errors.localized,
+      errors.frames,
+      errors.median_m,
+      errors.p95_m,
+      100.0 * errors.within_95);
+}
+
 void AppendRegions(const TrainingReport& report, std::string& html) {
   html +=
       "<h2>Regions</h2>\n<div class=\"wide\"><table>\n<thead><tr><th></th><th>metres</th>"
       "<th>training images</th><th>held out, found</th><th>median, m</th><th>median, deg</th>"
       "<th>p95, m</th><th>within 1 m</th><th>inside 95 %</th></tr></thead>\n<tbody>\n";
   for (const RegionReport& region : report.regions) {
-    constexpr double kDegrees = 57.29577951308232;
     fmt::format_to(std::back_inserter(html),
-                   "<tr><td>{}</td><td>{:.0f} – {:.0f}</td><td>{}</td><td>{} of {}</td>"
-                   "<td>{:.3f}</td><td>{:.2f}</td><td>{:.3f}</td><td>{:.0f} %</td><td>{:.0f} %</td>"
-                   "</tr>\n",
+                   "<tr><td>{}</td><td>{:.0f} – {:.0f}</td><td>{}</td><td>{} of {}</td>{}</tr>\n",
                    EscapeHtml(region.name),
                    region.begin_m,
                    region.end_m,
                    region.training_frames,
                    region.errors.localized,
                    region.errors.frames,
-                   region.errors.median_m,
-                   region.errors.median_rad * kDegrees,
-                   region.errors.p95_m,
-                   100.0 * region.errors.within_1m,
-                   100.0 * region.errors.within_95);
+                   AccuracyCells(region.errors));
   }
   html += "</tbody></table></div>\n";
 }
@@ -114,19 +135,13 @@ Result<std::string> FormatTrainingReportHtml(const TrainingReport& report) {
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
       "name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<title>Map of "
-      "{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>Map of {0}</h1>\n<p>{2:.0f} m in {3} "
-      "regions. {4} of {5} held-out images are found, with a median error of {6:.3f} m (p95 "
-      "{7:.3f} "
-      "m); {8:.0f} % of them are inside the reported 95 % region.</p>\n",
+      "{0}</title>\n<style>{1}</style>\n</head>\n<body>\n<h1>Map of {0}</h1>\n<p>{2:.0f} m in {3}. "
+      "{4}</p>\n",
       EscapeHtml(report.datasets),
       kStyle,
       report.route_m,
-      report.regions.size(),
-      report.errors.localized,
-      report.errors.frames,
-      report.errors.median_m,
-      report.errors.p95_m,
-      100.0 * report.errors.within_95);
+      report.regions.size() == 1 ? "one region" : fmt::format("{} regions", report.regions.size()),
+      Verdict(report.errors));
   fmt::format_to(std::back_inserter(html),
                  "<h2>The route from above</h2>\n<picture><source media=\"(prefers-color-scheme: "
                  "dark)\" srcset=\"data:image/png;base64,{}\"><img alt=\"the route with the "

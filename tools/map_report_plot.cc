@@ -18,6 +18,7 @@ cv::Scalar ColourOf(const HeldOutFrame& frame) {
   return {0, 94, 213};
 }
 
+/// Around the route, as wide as `box` and at most as high: lower for a route that goes along x.
 Panel MakePanel(const TrainingReport& report, cv::Rect2d box) {
   Panel panel{.box = box, .x = {}, .y = {}};
   for (const Eigen::Vector2d& p : report.path) {
@@ -26,6 +27,10 @@ Panel MakePanel(const TrainingReport& report, cv::Rect2d box) {
   }
   panel.x.Grow(2.0);
   panel.y.Grow(2.0);
+  constexpr double kLeastHeight = 200.0;
+  panel.box.height =
+      std::clamp(box.width * panel.y.size() / panel.x.size(), kLeastHeight, box.height);
+  box = panel.box;
   // The same scale along both axes.
   const double metres_per_unit = std::max(panel.x.size() / box.width, panel.y.size() / box.height);
   panel.x.Grow(0.5 * (metres_per_unit * box.width - panel.x.size()));
@@ -37,9 +42,13 @@ Panel MakePanel(const TrainingReport& report, cv::Rect2d box) {
 
 std::string PlotTrainingReport(const TrainingReport& report, bool is_dark) {
   constexpr double kWidth = 900.0;
-  constexpr double kHeight = 640.0;
-  Canvas canvas(kWidth, kHeight, is_dark ? PlotTheme::Dark() : PlotTheme{}, 1.5);
-  const Panel panel = MakePanel(report, {60.0, 20.0, kWidth - 80.0, kHeight - 70.0});
+  constexpr double kMostHeight = 640.0;
+  constexpr double kAbove = 20.0;
+  constexpr double kBelow = 50.0;
+  const Panel panel =
+      MakePanel(report, {60.0, kAbove, kWidth - 80.0, kMostHeight - kAbove - kBelow});
+  const double height = panel.box.height + kAbove + kBelow;
+  Canvas canvas(kWidth, height, is_dark ? PlotTheme::Dark() : PlotTheme{}, 1.5);
   DrawAxes(canvas, panel, "x, m", "y, m");
   std::vector<cv::Point2d> path;
   for (const Eigen::Vector2d& p : report.path)

@@ -122,7 +122,7 @@ class TrainingReportTest : public testing::Test {
  protected:
   TrainingReportTest() {
     report_.datasets = "morning & <evening>";
-    report_.how = "400 iterations of 512, seed 1, 60 s with 1 threads";
+    report_.how = "400 iterations of 512, seed 1, 60 s, threads: 1";
     report_.route_m = 396.0;
     report_.errors = {.frames = 100, .localized = 97, .median_m = 0.2, .p95_m = 1.25};
     report_.errors.median_rad = 0.01;
@@ -179,7 +179,7 @@ TEST_F(TrainingReportTest, ThePageIsWellFormedAndHasItsSectionsAndPictures) {
   for (const char* section :
        {"The route from above", "Regions", "What to drive again", "How it was learned"})
     EXPECT_THAT(*html, HasSubstr(fmt::format("<h2>{}</h2>", section)));
-  EXPECT_THAT(*html, HasSubstr("97 of 100 held-out images are found"));
+  EXPECT_THAT(*html, HasSubstr("396 m in 2 regions. 97 of 100 held-out images are found"));
   // The route on a dark and on a light page, and an image for each of two stretches.
   EXPECT_THAT(WidthsOfPictures(*html), testing::ElementsAre(1350, 1350, 12, 12));
 }
@@ -201,6 +201,17 @@ TEST_F(TrainingReportTest, ThePageNeedsNothingElse) {
     EXPECT_THAT(*html, Not(HasSubstr(foreign)));
 }
 
+/// A median of nothing is not 0.000 m.
+TEST_F(TrainingReportTest, WhereNothingIsFoundThePageHasNoErrors) {
+  report_.errors = {.frames = 40};
+  const auto html = FormatTrainingReportHtml(report_);
+  ASSERT_TRUE(html);
+  EXPECT_EQ(ProblemOf(*html), "");
+  EXPECT_THAT(*html, HasSubstr("None of 40 held-out images is found."));
+  EXPECT_THAT(*html, HasSubstr("<td>0 of 0</td><td>–</td>"));
+  EXPECT_THAT(*html, Not(HasSubstr("0.000")));
+}
+
 TEST_F(TrainingReportTest, WithoutWeakStretchesThePageSaysSo) {
   report_.weak.clear();
   report_.regions.front().live.clear();
@@ -216,6 +227,19 @@ TEST_F(TrainingReportTest, AnImageThatIsGoneIsNamed) {
   const auto html = FormatTrainingReportHtml(report_);
   ASSERT_FALSE(html);
   EXPECT_THAT(html.error().message, HasSubstr("gone.jpg"));
+}
+
+/// The same scale along both axes, and no more room than the route takes.
+TEST_F(TrainingReportTest, ThePlotIsAsHighAsTheRoute) {
+  const auto height = [this](double y_m) {
+    report_.path = {{0.0, 0.0}, {100.0, y_m}};
+    const std::string png = PlotTrainingReport(report_, false);
+    const std::vector<unsigned char> bytes(png.begin(), png.end());
+    return cv::imdecode(bytes, cv::IMREAD_COLOR).rows;
+  };
+  EXPECT_EQ(height(0.0), 405);   // a panel of 200
+  EXPECT_EQ(height(48.0), 720);  // half as high as wide: 410
+  EXPECT_EQ(height(500.0), 960);
 }
 
 /// Of frames that are not found, the plot has dots of another colour.
