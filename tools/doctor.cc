@@ -449,6 +449,7 @@ std::string FormatFindings(const std::vector<Finding>& findings) {
 
 std::string FormatFindingsAsJson(const std::vector<Finding>& findings) {
   std::vector<std::string> checks;
+  checks.reserve(findings.size());
   for (const Finding& finding : findings) {
     checks.push_back(fmt::format(R"({{"name": {}, "ok": {}, "found": {}, "command": {}}})",
                                  Quoted(finding.name),

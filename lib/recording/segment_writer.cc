@@ -153,13 +153,13 @@ void SegmentWriter::DeleteOldest() {
 }
 
 bool SegmentWriter::Excluded(std::string_view channel) const {
-  return std::any_of(
-      config_.exclude_channels.begin(),
-      config_.exclude_channels.end(),
-      [channel](const std::string& pattern) {
-        if (!pattern.ends_with('*')) return pattern == channel;
-        return channel.starts_with(std::string_view(pattern).substr(0, pattern.size() - 1));
-      });
+  return std::any_of(config_.exclude_channels.begin(),
+                     config_.exclude_channels.end(),
+                     [channel](const std::string& pattern) {
+                       if (!pattern.ends_with('*')) return pattern == channel;
+                       const std::string_view prefix(pattern.data(), pattern.size() - 1);
+                       return channel.starts_with(prefix);
+                     });
 }
 
 }  // namespace relocd
