@@ -76,6 +76,7 @@ Result<void> ValidateAfter(const std::map<std::string, const ProcessConfig*>& al
         after, [&all](const std::string& other) { return all.count(other) == 0; });
     if (unknown == after.end()) continue;
     std::vector<std::string> names;
+    names.reserve(all.size());
     for (const auto& entry : all)
       names.push_back(entry.first);
     return Invalid(
@@ -89,10 +90,9 @@ Result<void> ValidateOrder(const std::map<std::string, const ProcessConfig*>& al
   // Takes away those that wait for nobody, until none is left; who is left then is in a circle.
   auto left = all;
   while (!left.empty()) {
-    const auto next = std::find_if(left.begin(), left.end(), [&](const auto& entry) {
-      const auto& after = entry.second->after;
-      return std::none_of(
-          after.begin(), after.end(), [&](const auto& name) { return left.count(name) != 0; });
+    const auto is_left = [&left](const std::string& name) { return left.count(name) != 0; };
+    const auto next = std::ranges::find_if(left, [&is_left](const auto& entry) {
+      return std::ranges::none_of(entry.second->after, is_left);
     });
     if (next == left.end()) {
       return Invalid(fmt::format("{}.after leads back to {}, must not be a circle",
@@ -152,6 +152,7 @@ void AddDaemon(const NamedProcess& daemon,
 /// Puts the cameras' processes for `camerad`, and drops who is not in the table.
 void ResolveAfter(std::vector<ProcessSpec>& table) {
   std::vector<std::string> names;
+  names.reserve(table.size());
   for (const ProcessSpec& spec : table)
     names.push_back(spec.name);
   for (ProcessSpec& spec : table) {
