@@ -1,6 +1,7 @@
 #include "smoothing/motion_log_csv.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
@@ -16,6 +17,9 @@
 
 namespace relocd {
 namespace {
+
+/// In metres and rad: what is beyond it is no place on the Earth, and its square may be infinite.
+constexpr double kLargestNumber = 1e8;
 
 /// The rows of a table with a time and perhaps a covariance.
 class MotionTable {
@@ -60,6 +64,13 @@ class MotionTable {
     for (std::size_t i = 0; i < columns.size(); ++i) {
       auto number = csv_.Double(row, columns[i]);
       if (!number) return std::move(number).error();
+      if (std::abs(*number) > kLargestNumber) {
+        return Error{ErrorKind::kInvalidInput,
+                     fmt::format("{}: a number is {}, must be within {} m or rad",
+                                 csv_.Where(row),
+                                 *number,
+                                 kLargestNumber)};
+      }
       numbers[static_cast<Eigen::Index>(i)] = *number;
     }
     return numbers;

@@ -76,6 +76,9 @@ INSTANTIATE_TEST_SUITE_P(
     BadOdometryCsvTest,
     testing::Values(
         BadFile{"Header", "time_ns,dx,dy,dtheta\n", "odo.csv: line 1: the header has no column"},
+        BadFile{"Absurd",
+                "time_ns,dx_m,dy_m,dtheta_rad\n0,0,0,0\n5,-1e300,0,0\n",
+                "odo.csv: line 3: a number is -1e+300, must be within 100000000 m or rad"},
         BadFile{"NotANumber",
                 "time_ns,dx_m,dy_m,dtheta_rad\n1,0,zero,0\n",
                 "odo.csv: line 2: dy_m is 'zero', must be a finite number"},
