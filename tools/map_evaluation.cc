@@ -52,6 +52,22 @@ Result<FrameLocalization> LocalizeFrame(MapLocalizer& localizer,
       .milliseconds = std::chrono::duration<double, std::milli>(elapsed).count()};
 }
 
+/// One thread's part: works on the next frame until none is left.
+Result<void> LocalizeSome(const SceneMap& map,
+                          const std::vector<DatasetFrame>& frames,
+                          const ImageChange& change,
+                          std::atomic<std::size_t>& next,
+                          std::vector<FrameLocalization>& results) {
+  auto localizer = MapLocalizer::Create(map, {});
+  if (!localizer) return std::move(localizer).error();
+  for (std::size_t index = next++; index < frames.size(); index = next++) {
+    auto result = LocalizeFrame(**localizer, frames[index], change);
+    if (!result) return std::move(result).error();
+    results[index] = std::move(*result);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
@@ -59,32 +75,20 @@ Result<std::vector<FrameLocalization>> LocalizeFrames(const SceneMap& map,
                                                       int threads,
                                                       const ImageChange& change) {
   std::vector<FrameLocalization> results(frames.size());
-  std::vector<std::optional<Error>> errors(static_cast<std::size_t>(threads));
+  std::vector<Result<void>> ends(static_cast<std::size_t>(threads));
   std::atomic<std::size_t> next = 0;
-  const auto work = [&](std::optional<Error>& error) {
-    auto localizer = MapLocalizer::Create(map, {});
-    if (!localizer) {
-      error = std::move(localizer).error();
-      return;
-    }
-    for (std::size_t index = next++; index < frames.size(); index = next++) {
-      auto result = LocalizeFrame(**localizer, frames[index], change);
-      if (!result) {
-        error = std::move(result).error();
-        return;
-      }
-      results[index] = std::move(*result);
-    }
+  const auto work = [&](Result<void>& end) {
+    end = LocalizeSome(map, frames, change, next, results);
   };
   {
     std::vector<std::jthread> others;
-    for (std::size_t thread = 1; thread < errors.size(); ++thread) {
-      others.emplace_back(work, std::ref(errors[thread]));
+    for (std::size_t thread = 1; thread < ends.size(); ++thread) {
+      others.emplace_back(work, std::ref(ends[thread]));
     }
-    work(errors.front());
+    work(ends.front());
   }
-  for (std::optional<Error>& error : errors) {
-    if (error) return std::move(*error);
+  for (Result<void>& end : ends) {
+    if (!end) return std::move(end).error();
   }
   return results;
 }
@@ -141,10 +145,10 @@ PoseErrors MeasureErrors(const SceneMap& map, const std::vector<FrameLocalizatio
   for (const FrameLocalization& localization : localizations) {
     milliseconds.push_back(localization.milliseconds);
     if (localization.pose.status != CameraPoseStatus::kOk) continue;
-    const Pose3 X_WC_true = TruthInMap(map, localization.frame);
+    const Pose3 truth = TruthInMap(map, localization.frame);
     const Pose3& X_WC = localization.pose.X_WC;
-    metres.push_back((X_WC.translation() - X_WC_true.translation()).norm());
-    radians.push_back(AngleBetween(X_WC.rotation(), X_WC_true.rotation()));
+    metres.push_back((X_WC.translation() - truth.translation()).norm());
+    radians.push_back(AngleBetween(X_WC.rotation(), truth.rotation()));
     const Matrix6d& covariance = localization.pose.covariance;
     sigmas_m.push_back(std::sqrt(covariance.topLeftCorner<3, 3>().trace()));
     if (metres.back() < 1.0) ++near;
