@@ -111,8 +111,14 @@ void ChainSolver::Linearize(KeyframeWindow& window, const FixWeighting& weightin
 void ChainSolver::LinearizeMotion(std::size_t i) {
   const Node& before = nodes_[i - 1];
   Node& node = nodes_[i];
-  node.motion = node.residual.Linearize(before.estimate(), node.estimate());
-  node.motion.error -= node.motion.by_A * before.delta + node.motion.by_B * node.delta;
+  const auto at = node.residual.Linearize(before.estimate(), node.estimate());
+  const Eigen::Vector3d error = at.error - at.by_A * before.delta - at.by_B * node.delta;
+  // by_A * delta_before + by_B * delta + error is zero but for the noise. by_B is a rotation, its
+  // transpose its inverse, and by_A is -by_B but for what a turn does.
+  node.motion.arm = -(at.by_B.transpose() * at.by_A.col(2));
+  node.motion.arm.z() = 0.0;
+  node.motion.offset = -(at.by_B.transpose() * error);
+  node.motion.covariance = Symmetric(at.by_B.transpose() * node.residual.covariance() * at.by_B);
   node.motion_yaw = before.estimate().z();
   node.is_motion_new = false;
 }
@@ -161,20 +167,15 @@ ChainSolver::Prediction ChainSolver::FromPrior(const KeyframeWindow& window) con
 ChainSolver::Prediction ChainSolver::Predict(std::size_t i, const FixWeighting& weighting) {
   Node& before = nodes_[i - 1];
   const Node& node = nodes_[i];
-  // by_A * delta_before + by_B * delta + error is zero but for the motion's noise.
-  const Eigen::Matrix3d cross = before.covariance * node.motion.by_A.transpose();
-  const Eigen::Matrix3d innovation =
-      Symmetric(node.residual.covariance() + node.motion.by_A * cross);
-  const Eigen::Vector3d error = node.motion.error + node.motion.by_A * before.mean;
-  const Eigen::Matrix3d gain = cross * innovation.inverse();
-  before.gain = gain * node.motion.by_B;
-  before.offset = before.mean - gain * error;
-  // by_B is a rotation: its transpose is its inverse.
-  const Eigen::Matrix3d by_before = -(node.motion.by_B.transpose() * node.motion.by_A);
-  return {-(node.motion.by_B.transpose() * error),
-          Symmetric(node.motion.by_B.transpose() * innovation * node.motion.by_B),
-          {Symmetric(by_before * before.bias.covariance * by_before.transpose()),
-           weighting.BiasKept(node.seconds_before) * by_before * before.bias.cross}};
+  const LinearMotion& motion = node.motion;
+  Prediction predicted;
+  predicted.mean = before.mean + motion.arm * before.mean.z() + motion.offset;
+  predicted.covariance = Symmetric(motion.MoveBoth(before.covariance)) + motion.covariance;
+  before.gain = motion.Move(before.covariance).transpose() * predicted.covariance.inverse();
+  before.offset = before.mean - before.gain * predicted.mean;
+  predicted.bias.covariance = Symmetric(motion.MoveBoth(before.bias.covariance));
+  predicted.bias.cross = weighting.BiasKept(node.seconds_before) * motion.Move(before.bias.cross);
+  return predicted;
 }
 
 void ChainSolver::Correct(const Prediction& predicted, double misfit, double damping, Node& node) {
@@ -182,8 +183,6 @@ void ChainSolver::Correct(const Prediction& predicted, double misfit, double dam
     node.mean = predicted.mean;
     node.covariance = predicted.covariance;
     node.bias = predicted.bias;
-    node.kept.setIdentity();
-    node.by_bias.setZero();
     return;
   }
   Eigen::Matrix3d information = node.information / misfit;
@@ -193,18 +192,17 @@ void ChainSolver::Correct(const Prediction& predicted, double misfit, double dam
     information.diagonal() += hold;
     rhs += hold.cwiseProduct(node.delta);
   }
-  node.kept = (Eigen::Matrix3d::Identity() + predicted.covariance * information).inverse();
-  node.mean = node.kept * (predicted.mean + predicted.covariance * rhs);
-  node.covariance = Symmetric(node.kept * predicted.covariance);
+  const Eigen::Matrix3d kept =
+      (Eigen::Matrix3d::Identity() + predicted.covariance * information).inverse();
+  node.mean = kept * (predicted.mean + predicted.covariance * rhs);
+  node.covariance = Symmetric(kept * predicted.covariance);
   // The error is kept * (that of the prediction) + by_bias * bias: a bias moves the fixes, and they
   // the mean.
-  node.by_bias = node.covariance * node.rhs_by_bias / misfit;
-  const Eigen::Matrix3d cross = node.kept * predicted.bias.cross;
-  const Eigen::Matrix3d mixed = cross * node.by_bias.transpose();
-  node.bias.covariance =
-      Symmetric(node.kept * predicted.bias.covariance * node.kept.transpose() + mixed +
-                mixed.transpose() + node.by_bias * node.by_bias.transpose());
-  node.bias.cross = cross + node.by_bias;
+  const Eigen::Matrix3d by_bias = node.covariance * node.rhs_by_bias / misfit;
+  const Eigen::Matrix3d part =
+      kept * predicted.bias.covariance + by_bias * predicted.bias.cross.transpose();
+  node.bias.cross = kept * predicted.bias.cross + by_bias;
+  node.bias.covariance = Symmetric(part * kept.transpose() + node.bias.cross * by_bias.transpose());
 }
 
 void ChainSolver::Eliminate(const KeyframeWindow& window,
@@ -232,7 +230,7 @@ ChainSolver::Step ChainSolver::Substitute(std::size_t first_new) {
         break;
       }
       node.delta_after = after;
-      delta = node.offset - node.gain * after;
+      delta = node.offset + node.gain * after;
     }
     const Eigen::Vector3d change = delta - node.delta;
     step.length_m = std::max(step.length_m, change.head<2>().lpNorm<Eigen::Infinity>());
@@ -384,16 +382,20 @@ ChainSolver::SmoothedBias ChainSolver::BiasBefore(std::size_t i,
                                                   const SmoothedBias& after,
                                                   const FixWeighting& weighting) const {
   const Node& next = nodes_[i + 1];
-  const Eigen::Matrix3d by_before = -(next.motion.by_B.transpose() * next.motion.by_A);
   const Eigen::Matrix3d& gain = nodes_[i].gain;
-  const Eigen::Matrix3d by_next_bias = after.kept * next.by_bias;
+  // As in Correct: the filter's covariance is what the fixes leave of the prediction's.
+  const Eigen::Matrix3d next_kept =
+      Eigen::Matrix3d::Identity() - next.covariance * next.information / weighting.misfit();
+  const Eigen::Matrix3d by_next_bias =
+      after.kept * next.covariance * next.rhs_by_bias / weighting.misfit();
   const Eigen::Matrix3d mixed = by_next_bias * after.cross.transpose();
   SmoothedBias bias;
-  bias.kept -= gain * (after.kept * next.kept - Eigen::Matrix3d::Identity()) * by_before;
+  const Eigen::Matrix3d changed = after.kept * next_kept - Eigen::Matrix3d::Identity();
+  bias.kept += gain * next.motion.MoveFromRight(changed);
   bias.later = Symmetric(
       gain * (by_next_bias * by_next_bias.transpose() + after.later + mixed + mixed.transpose()) *
       gain.transpose());
-  bias.cross = -weighting.BiasKept(next.seconds_before) * gain * (by_next_bias + after.cross);
+  bias.cross = weighting.BiasKept(next.seconds_before) * gain * (by_next_bias + after.cross);
   return bias;
 }
 

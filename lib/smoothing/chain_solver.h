@@ -60,42 +60,61 @@ class ChainSolver {
                                                    const FixWeighting& weighting);
 
  private:
+  /// A motion along W's axes: delta = delta of the node before + arm * its yaw + offset + noise.
+  struct LinearMotion {
+    Eigen::Vector3d arm = Eigen::Vector3d::Zero();  ///< How a turn before moves the node; no yaw.
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+
+    /// (The derivative by the node before) * matrix, and that * its transpose.
+    [[nodiscard]] Eigen::Matrix3d Move(const Eigen::Matrix3d& matrix) const {
+      return matrix + arm * matrix.row(2);
+    }
+    /// matrix * (the derivative by the node before).
+    [[nodiscard]] Eigen::Matrix3d MoveFromRight(Eigen::Matrix3d matrix) const {
+      matrix.col(2) += Eigen::Vector3d(matrix * arm);
+      return matrix;
+    }
+    [[nodiscard]] Eigen::Matrix3d MoveBoth(const Eigen::Matrix3d& symmetric) const {
+      const Eigen::Matrix3d moved = Move(symmetric);
+      return moved + moved.col(2) * arm.transpose();
+    }
+  };
+
   /// A keyframe's part of the equations. Its estimate is reference + delta.
   struct Node {
+    // What each fix looks at in all nodes stands first, together in the cache.
     std::int64_t id = 0;
     Eigen::Vector3d reference = Eigen::Vector3d::Zero();
     Eigen::Vector3d delta = Eigen::Vector3d::Zero();
+    Eigen::Vector3d delta_before_step = Eigen::Vector3d::Zero();
+    Eigen::Vector3d weighted_at = Eigen::Vector3d::Zero();
+    double largest_information_m = 0.0;
+    double largest_information_rad = 0.0;
+    double motion_yaw = 0.0;  ///< Of the node before, where its motion is linearised.
+    bool has_fixes = false;
+    bool is_motion_new = true;
+    bool are_fixes_new = true;
 
-    /// The motion from the node before, whose error at all deltas zero is `motion.error`.
-    RelativePoseResidual residual;
-    RelativePoseResidual::Linearization motion;
-    double motion_yaw = 0.0;      ///< Of the node before, where it is linearised.
+    /// The motion from the node before.
+    LinearMotion motion;
     double seconds_before = 0.0;  ///< Since the node before.
 
     /// The fixes: information * delta = rhs, without the misfit.
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
     Eigen::Matrix3d rhs_by_bias = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d weighted_at = Eigen::Vector3d::Zero();
-    double largest_information_m = 0.0;
-    double largest_information_rad = 0.0;
-    bool has_fixes = false;
-    bool is_motion_new = true;
-    bool are_fixes_new = true;
 
     /// What is known of the delta from here and before.
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     FixBiasEffect bias;  ///< On the mean.
-    /// The fixes of this node leave `kept` of an error of the prediction, and add `by_bias` times
-    /// their bias.
-    Eigen::Matrix3d kept = Eigen::Matrix3d::Identity();
-    Eigen::Matrix3d by_bias = Eigen::Matrix3d::Zero();
-    /// delta = offset - gain * delta of the node after, for which it was last taken.
+    /// delta = offset + gain * delta of the node after, for which it was last taken.
     Eigen::Matrix3d gain = Eigen::Matrix3d::Zero();
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();
     Eigen::Vector3d delta_after = Eigen::Vector3d::Zero();
-    Eigen::Vector3d delta_before_step = Eigen::Vector3d::Zero();
+
+    RelativePoseResidual residual;
 
     [[nodiscard]] Eigen::Vector3d estimate() const { return reference + delta; }
   };
