@@ -40,6 +40,12 @@ Eigen::Matrix3d TangentRotation(double yaw) {
   return rotation;
 }
 
+/// Whether a pose that moves by so much may be left where it is.
+bool IsLeast(const Eigen::Vector3d& moved) {
+  return moved.head<2>().lpNorm<Eigen::Infinity>() < kLeastLength &&
+         std::abs(moved.z()) < kLeastTurn;
+}
+
 /// A covariance along W's axes, of one along those of a body that looks to `yaw`.
 Eigen::Matrix3d AlongMap(const Eigen::Matrix3d& covariance, double yaw) {
   const Eigen::Matrix3d rotation = TangentRotation(yaw);
@@ -86,25 +92,19 @@ void ChainSolver::Synchronize(const KeyframeWindow& window) {
 void ChainSolver::Linearize(KeyframeWindow& window, const FixWeighting& weighting) {
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     Node& node = nodes_[i];
-    bool is_changed = false;
-    if (i > 0) {
-      const double yaw = nodes_[i - 1].reference.z() + nodes_[i - 1].delta.z();
-      if (node.is_motion_new || std::abs(yaw - node.motion_yaw) > kLinearTurn) {
-        LinearizeMotion(i);
-        is_changed = true;
-      }
-    }
+    const bool is_turned =
+        i > 0 && std::abs(nodes_[i - 1].estimate().z() - node.motion_yaw) > kLinearTurn;
+    const bool is_motion_changed = i > 0 && (node.is_motion_new || is_turned);
+    if (is_motion_changed) LinearizeMotion(i);
     if (node.has_fixes && !node.are_fixes_new) {
       const Eigen::Vector3d moved = node.estimate() - node.weighted_at;
       const double squared = node.largest_information_m * moved.head<2>().squaredNorm() +
                              node.largest_information_rad * moved.z() * moved.z();
       node.are_fixes_new = squared > kLinearShare * kLinearShare;
     }
-    if (node.are_fixes_new) {
-      LinearizeFixes(window, weighting, node);
-      is_changed = true;
-    }
-    if (is_changed) first_dirty_ = std::min(first_dirty_, i);
+    const bool are_fixes_changed = node.are_fixes_new;
+    if (are_fixes_changed) LinearizeFixes(window, weighting, node);
+    if (is_motion_changed || are_fixes_changed) first_dirty_ = std::min(first_dirty_, i);
   }
 }
 
@@ -224,11 +224,7 @@ ChainSolver::Step ChainSolver::Substitute(std::size_t first_new) {
     Eigen::Vector3d delta = node.mean;
     if (!is_newest) {
       const Eigen::Vector3d& after = nodes_[i + 1].delta;
-      const Eigen::Vector3d moved = after - node.delta_after;
-      if (i < first_new && moved.head<2>().lpNorm<Eigen::Infinity>() < kLeastLength &&
-          std::abs(moved.z()) < kLeastTurn) {
-        break;
-      }
+      if (i < first_new && IsLeast(after - node.delta_after)) break;
       node.delta_after = after;
       delta = node.offset + node.gain * after;
     }

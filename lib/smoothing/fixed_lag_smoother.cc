@@ -189,13 +189,13 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
                              step.X_BprevB.y(),
                              step.X_BprevB.yaw())};
   }
-  const Pose2 X_BprevB = drift_.Correct(step.X_BprevB);
-  newest_motion_ = X_BprevB;
+  const Pose2 X_AB = drift_.Correct(step.X_BprevB);
+  newest_motion_ = X_AB;
   OdometrySample sample = history_.newest();
   sample.time = step.time;
-  sample.X_OB = sample.X_OB * X_BprevB;
-  sample.X_KB = sample.X_KB * X_BprevB;
-  sample.covariance_KB = ComposeCovariance(sample.covariance_KB, X_BprevB, covariance);
+  sample.X_OB = sample.X_OB * X_AB;
+  sample.X_KB = sample.X_KB * X_AB;
+  sample.covariance_KB = ComposeCovariance(sample.covariance_KB, X_AB, covariance);
   sample.step_covariance = covariance;
   odometer_m_ += step.X_BprevB.translation().norm();
 
