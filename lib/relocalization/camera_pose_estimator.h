@@ -24,7 +24,7 @@ struct PoseCalibration {
 
 /// How a camera pose is searched.
 struct CameraPoseOptions {
-  int hypotheses = 64;
+  int hypotheses = 32;
   int max_tries = 4000;
   int scored_points = 600;
   int refined_hypotheses = 6;

@@ -54,7 +54,7 @@ double CubicRoot(double b, double c, double d) {
     if (slope == 0.0) break;
     const double step = value(x) / slope;
     x -= step;
-    if (std::abs(step) <= 1e-15 * std::abs(x)) break;
+    if (std::abs(step) <= 1e-12 * std::abs(x)) break;
   }
   return x;
 }
@@ -166,7 +166,7 @@ Intersections Intersect(const Eigen::Vector3d& line, const Eigen::Matrix3d& coni
 /// Newton steps on the three quadrics. @return false where they lead to no positive solution.
 bool Polish(const Triangle& triangle, Eigen::Vector3d& l) {
   constexpr int kMaxSteps = 5;
-  constexpr double kTolerance = 1e-15;  // of equations whose right sides add up to 1
+  constexpr double kTolerance = 1e-12;  // of equations whose right sides add up to 1
   Eigen::Vector3d residual = triangle.Residual(l);
   for (int i = 0; i < kMaxSteps && residual.cwiseAbs().maxCoeff() > kTolerance; ++i) {
     Eigen::Matrix3d J;  // half of it, as of the residual below
