@@ -39,6 +39,7 @@
 #include "runtime/event_loop.h"
 #include "smoothing/offline_smoother.h"
 #include "supervision/child_process.h"
+#include "support/camera_pose_message.h"
 
 // pose_latency: how long it takes from an ODOMETRY message to its POSE, between processes and over
 // LCM, while fixes are solved for. To be run in tests/integration/in_network.
@@ -104,21 +105,11 @@ class Drive {
     const double sigma_m = ++fixes_ % 10 == 0 ? 5.0 : 0.1;
     const Pose2 error(sigma_m * normal_(engine_), sigma_m * normal_(engine_), 0.0);
     const Pose2 back = Pose2::Exp({kSpeed * -0.05, 0.0, kYawRate * -0.05});
-    const Pose3 X_WC = LiftFromPlane(X_WB_ * back * error) * X_BC();
-    camera_pose_t message{};
+    camera_pose_t message = CameraPoseMessage(LiftFromPlane(X_WB_ * back * error) * X_BC());
     message.mono_ns = ToNanoseconds(time_) - 50'000'000;
     message.utime = message.mono_ns / 1000;
     message.seq = fixes_;
     message.run_id = kRunId;
-    message.camera = "front";
-    message.map_id = "map";
-    message.status = camera_pose_t::STATUS_OK;
-    Eigen::Map<Eigen::Vector3d>(message.pos) = X_WC.translation();
-    const Eigen::Quaterniond& q = X_WC.rotation();
-    Eigen::Map<Eigen::Vector4d>(message.quat) << q.w(), q.vec();
-    Vector6d sigmas;
-    sigmas << 0.1, 0.1, 0.1, 0.02, 0.02, 0.02;
-    Eigen::Map<Matrix6d>(message.covariance) = sigmas.cwiseAbs2().asDiagonal();
     return message;
   }
 
@@ -182,7 +173,7 @@ class WireTap {
 
   /// The next POSE that waits.
   std::optional<Heard> Next() {
-    std::array<std::uint8_t, 65536> buffer;  // NOLINT(cppcoreguidelines-pro-type-member-init)
+    std::array<std::uint8_t, 65536> buffer{};
     alignas(cmsghdr) std::array<char, 256> control{};
     iovec data{.iov_base = buffer.data(), .iov_len = buffer.size()};
     while (true) {

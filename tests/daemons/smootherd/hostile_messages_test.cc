@@ -13,6 +13,7 @@
 #include "messaging/in_process_bus.h"
 #include "smootherd/smoother_node.h"
 #include "smoothing/offline_smoother.h"
+#include "support/camera_pose_message.h"
 #include "support/random.h"
 
 // Messages that decode, and whose content is wrong: another program's fault, or a damaged log.
@@ -73,16 +74,8 @@ class HostileMessagesTest : public testing::Test {
 
   /// Of a camera in the body's origin, whose axes are the body's.
   [[nodiscard]] camera_pose_t Fix() const {
-    camera_pose_t message{};
+    camera_pose_t message = CameraPoseMessage(LiftFromPlane(Pose2(x_m_, 0.0, 0.0)));
     message.mono_ns = time_ns_;
-    message.camera = "front";
-    message.map_id = "map";
-    message.status = camera_pose_t::STATUS_OK;
-    message.pos[0] = x_m_;
-    message.quat[0] = 1.0;
-    Vector6d sigmas;
-    sigmas << 0.1, 0.1, 0.1, 0.02, 0.02, 0.02;
-    Eigen::Map<Matrix6d>(message.covariance) = sigmas.cwiseAbs2().asDiagonal();
     return message;
   }
 

@@ -20,6 +20,7 @@
 #include "geometry/planar.h"
 #include "messaging/in_process_bus.h"
 #include "smoothing/offline_smoother.h"
+#include "support/camera_pose_message.h"
 
 namespace relocd {
 namespace {
@@ -101,20 +102,10 @@ class SmootherNodeTest : public testing::Test {
   [[nodiscard]] camera_pose_t Fix() {
     const Pose3 X_WB =
         LiftFromPlane(X_WB_ * Pose2(0.1 * normal_(engine_), 0.1 * normal_(engine_), 0.0));
-    const Pose3 X_WC = X_WB * CameraMounting();
-    camera_pose_t message{};
+    camera_pose_t message = CameraPoseMessage(X_WB * CameraMounting());
     message.utime = time_ns_ / 1000 + 5;
     message.mono_ns = time_ns_;
     message.seq = fix_seq_++;
-    message.camera = "front";
-    message.map_id = "map";
-    message.status = camera_pose_t::STATUS_OK;
-    Eigen::Map<Eigen::Vector3d>(message.pos) = X_WC.translation();
-    const Eigen::Quaterniond& q = X_WC.rotation();
-    Eigen::Map<Eigen::Vector4d>(message.quat) << q.w(), q.vec();
-    Vector6d sigmas;
-    sigmas << 0.1, 0.1, 0.1, 0.02, 0.02, 0.02;
-    Eigen::Map<Matrix6d>(message.covariance) = sigmas.cwiseAbs2().asDiagonal();
     return message;
   }
 
