@@ -43,8 +43,9 @@ class SmootherNode {
   void Restore(const SavedState& state, const std::string& boot_id);
 
   /// Publishes POSE when there is one, LOCALIZATION, and MAP_TO_ODOM if the last one would put the
-  /// body 5 mm or 1 mrad from where it is: by fixes, or by the odometry's errors that are put right.
-  /// A message that is not newer than the last one, or not usable, is counted and has no effect.
+  /// body 5 mm or 1 mrad from where it is: by fixes, or by the odometry's errors that are put
+  /// right. A message that is not newer than the last one, or not usable, is counted and has no
+  /// effect.
   void Handle(const odometry_t& message);
 
   /// Puts a fix in. Publishes nothing, so that an odometry message that came meanwhile waits no
