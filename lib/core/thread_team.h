@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -44,5 +45,10 @@ class ThreadTeam {
   std::atomic<int> busy_ = 0;  ///< Helpers that have not returned from this round's work.
   std::vector<std::jthread> helpers_;
 };
+
+/// The caller alone.
+inline std::shared_ptr<ThreadTeam> TeamOfOne() {
+  return std::make_shared<ThreadTeam>(1);
+}
 
 }  // namespace relocd

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -91,10 +92,10 @@ GradientHistogramsConfig GradientHistogramsForImage(int width, int height) {
 }
 
 Result<std::unique_ptr<GradientHistograms>> GradientHistograms::Create(
-    const GradientHistogramsConfig& config, int threads) {
+    const GradientHistogramsConfig& config, std::shared_ptr<ThreadTeam> team) {
   if (auto valid = Validate(config); !valid) return std::move(valid).error();
   cv::setNumThreads(1);  // resizing takes less than waking OpenCV's pool, and callers have threads
-  return std::unique_ptr<GradientHistograms>(new GradientHistograms(config, threads));
+  return std::unique_ptr<GradientHistograms>(new GradientHistograms(config, std::move(team)));
 }
 
 int GradientHistogramsDimension(const GradientHistogramsConfig& config) {
@@ -145,14 +146,14 @@ Result<void> GradientHistograms::Extract(const GrayImage& image,
 void GradientHistograms::ExtractFromWorkingImage(std::span<const float> working,
                                                  std::size_t max_cells,
                                                  CellFeatures& features) {
-  maps_.Compute(working, config_.working_width, config_.working_height, config_.octaves, team_);
+  maps_.Compute(working, config_.working_width, config_.working_height, config_.octaves, *team_);
   ChooseCells(max_cells);
   const auto size = static_cast<std::size_t>(dimension());
   features.dimension = dimension();
   features.pixels.resize(cells_.size());
   features.values.resize(cells_.size() * size);
-  team_.Run([&](int part) {
-    const PartRange cells = RangeOfPart(static_cast<int>(cells_.size()), part, team_.size());
+  team_->Run([&](int part) {
+    const PartRange cells = RangeOfPart(static_cast<int>(cells_.size()), part, team_->size());
     for (auto index = static_cast<std::size_t>(cells.begin);
          index < static_cast<std::size_t>(cells.end);
          ++index) {

@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "core/result.h"
+#include "core/thread_team.h"
 #include "features/feature_extractor.h"
 #include "features/gradient_maps.h"
 
@@ -31,10 +33,10 @@ int GradientHistogramsDimension(const GradientHistogramsConfig& config);
 /// against the sky, or of shadows, and which side is the brighter one changes with the light.
 class GradientHistograms final : public FeatureExtractor {
  public:
-  /// @param threads  >= 1; features do not depend on it.
+  /// @param team  does the work; features do not depend on its size.
   /// @return kInvalidInput for a configuration that Validate refuses.
-  static Result<std::unique_ptr<GradientHistograms>> Create(const GradientHistogramsConfig& config,
-                                                            int threads = 1);
+  static Result<std::unique_ptr<GradientHistograms>> Create(
+      const GradientHistogramsConfig& config, std::shared_ptr<ThreadTeam> team = TeamOfOne());
 
   [[nodiscard]] int dimension() const override;
   Result<void> Extract(const GrayImage& image,
@@ -64,8 +66,8 @@ class GradientHistograms final : public FeatureExtractor {
     int row = 0;
   };
 
-  GradientHistograms(const GradientHistogramsConfig& config, int threads)
-      : config_(config), team_(threads) {}
+  GradientHistograms(const GradientHistogramsConfig& config, std::shared_ptr<ThreadTeam> team)
+      : config_(config), team_(std::move(team)) {}
 
   /// The features of one cell.
   void Describe(const Eigen::Vector2f& centre, std::span<float> feature) const;
@@ -75,7 +77,7 @@ class GradientHistograms final : public FeatureExtractor {
   [[nodiscard]] Eigen::Vector2f CellCentre(const Cell& cell) const;
 
   GradientHistogramsConfig config_;
-  ThreadTeam team_;
+  std::shared_ptr<ThreadTeam> team_;
   GradientMaps maps_;
   std::vector<float> working_;
   std::vector<Cell> cells_;

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/result.h"
+#include "core/thread_team.h"
 #include "features/feature_whitening.h"
 #include "scene_coordinates/head.h"
 
@@ -21,7 +22,9 @@ enum class Precision {
 Precision FastestPrecision();
 
 /// A feed-forward network run by oneDNN. Primitives and buffers are made once; Run does not
-/// allocate. Rows are worked through in blocks that stay in the second-level cache.
+/// allocate. Each thread of the team takes its part of the rows through all layers, in blocks that
+/// stay in the second-level cache, so that threads wait for each other once a call and not once a
+/// layer. The result does not depend on their number.
 ///
 /// Thread-bound.
 class OnednnLayers {
@@ -29,10 +32,10 @@ class OnednnLayers {
   /// A head's layers.
   static Result<std::unique_ptr<OnednnLayers>> ForHead(const Head& head,
                                                        Precision precision,
-                                                       int threads);
+                                                       std::shared_ptr<ThreadTeam> team);
   /// The whitening of features as one layer, in float.
   static Result<std::unique_ptr<OnednnLayers>> ForWhitening(const FeatureWhitening& whitening,
-                                                            int threads);
+                                                            std::shared_ptr<ThreadTeam> team);
   ~OnednnLayers();
 
   [[nodiscard]] int inputs() const;

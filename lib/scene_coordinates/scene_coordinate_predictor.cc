@@ -27,12 +27,12 @@ std::chrono::nanoseconds TimeOf(OnednnLayers& layers) {
 
 /// Which precision is the faster one for this head on this CPU. bfloat16 must be clearly faster:
 /// where there is little to choose, the choice should not hang on chance.
-Result<Precision> MeasureFastest(const Head& head, int threads) {
+Result<Precision> MeasureFastest(const Head& head, const std::shared_ptr<ThreadTeam>& team) {
   constexpr double kClearly = 0.8;
   if (FastestPrecision() != Precision::kBfloat16) return Precision::kFloat32;
-  auto narrow = OnednnLayers::ForHead(head, Precision::kBfloat16, threads);
+  auto narrow = OnednnLayers::ForHead(head, Precision::kBfloat16, team);
   if (!narrow) return Precision::kFloat32;
-  auto wide = OnednnLayers::ForHead(head, Precision::kFloat32, threads);
+  auto wide = OnednnLayers::ForHead(head, Precision::kFloat32, team);
   if (!wide) return std::move(wide).error();
   return TimeOf(**narrow) < kClearly * TimeOf(**wide) ? Precision::kBfloat16 : Precision::kFloat32;
 }
@@ -42,19 +42,20 @@ Result<Precision> MeasureFastest(const Head& head, int threads) {
 Result<std::unique_ptr<SceneCoordinatePredictor>> SceneCoordinatePredictor::Create(
     const SceneMap& map, int threads) {
   std::unique_ptr<SceneCoordinatePredictor> predictor(new SceneCoordinatePredictor(map));
-  auto extractor = GradientHistograms::Create(map.features, threads);
+  const auto team = std::make_shared<ThreadTeam>(threads);
+  auto extractor = GradientHistograms::Create(map.features, team);
   if (!extractor) return std::move(extractor).error();
   predictor->extractor_ = std::move(*extractor);
-  auto whitening = OnednnLayers::ForWhitening(map.whitening, threads);
+  auto whitening = OnednnLayers::ForWhitening(map.whitening, team);
   if (!whitening) return std::move(whitening).error();
   predictor->whitening_ = std::move(*whitening);
   if (!map.regions.empty()) {
-    const auto precision = MeasureFastest(map.regions.front().head, threads);
+    const auto precision = MeasureFastest(map.regions.front().head, team);
     if (!precision) return precision.error();
     predictor->precision_ = *precision;
   }
   for (const MapRegion& region : map.regions) {
-    auto head = OnednnLayers::ForHead(region.head, predictor->precision_, threads);
+    auto head = OnednnLayers::ForHead(region.head, predictor->precision_, team);
     if (!head) return std::move(head).error();
     predictor->heads_.push_back(std::move(*head));
   }

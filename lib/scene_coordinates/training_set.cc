@@ -366,7 +366,7 @@ TrainingSet Preparation::Run(const std::function<void(double)>& progress) {
   const auto make_state = [&] {
     auto state = std::make_unique<ViewState>();
     state->extractor = MakeExtractor();
-    state->whitening = OnednnLayers::ForWhitening(whitening_, 1).value();
+    state->whitening = OnednnLayers::ForWhitening(whitening_, TeamOfOne()).value();
     return state;
   };
   ForEachIndex(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -62,13 +63,13 @@ class Percentiles {
   void Time(const Work& work) {
     const auto start = std::chrono::steady_clock::now();
     work();
-    const auto elapsed = std::chrono::steady_clock::now() - start;
-    ms_.push_back(std::chrono::duration<double, std::milli>(elapsed).count());
+    Add(std::chrono::steady_clock::now() - start);
   }
-  void Report(benchmark::State& state) {
+  void Add(Duration elapsed) { ms_.push_back(1e3 * ToSeconds(elapsed)); }
+  void Report(const std::string& prefix, benchmark::State& state) {
     std::ranges::sort(ms_);
-    state.counters["p50_ms"] = ms_[ms_.size() / 2];
-    state.counters["p99_ms"] = ms_[ms_.size() * 99 / 100];
+    state.counters[prefix + "p50_ms"] = ms_[ms_.size() / 2];
+    state.counters[prefix + "p99_ms"] = ms_[ms_.size() * 99 / 100];
   }
 
  private:
@@ -92,7 +93,9 @@ BENCHMARK(BM_LoadMap)->Arg(1)->Arg(5)->Arg(20)->Unit(benchmark::kMillisecond);
 
 void BM_ExtractFeatures(benchmark::State& state) {
   const auto extractor =
-      GradientHistograms::Create(ShippedMap().features, static_cast<int>(state.range(0))).value();
+      GradientHistograms::Create(ShippedMap().features,
+                                 std::make_shared<ThreadTeam>(static_cast<int>(state.range(0))))
+          .value();
   const GrayImage& picture = Picture();
   CellFeatures features;
   Percentiles percentiles;
@@ -102,7 +105,7 @@ void BM_ExtractFeatures(benchmark::State& state) {
                    "the picture has the map's size");
     });
   }
-  percentiles.Report(state);
+  percentiles.Report("", state);
 }
 BENCHMARK(BM_ExtractFeatures)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
@@ -126,7 +129,7 @@ void BM_Localize(benchmark::State& state) {
   int poses = 0;
   Duration features{};
   Duration heads{};
-  Duration pose{};
+  Percentiles pose;
   for (auto _ : state) {
     percentiles.Time([&] {
       const auto localization =
@@ -134,16 +137,16 @@ void BM_Localize(benchmark::State& state) {
       if (localization->region == 0) ++poses;
       features += localization->features_time;
       heads += localization->head_time;
-      pose += localization->pose_time;
+      pose.Add(localization->pose_time);
     });
   }
-  percentiles.Report(state);
+  percentiles.Report("", state);
+  pose.Report("pose_", state);
   const auto mean_ms = [&state](Duration sum) {
     return 1e3 * ToSeconds(sum) / static_cast<double>(state.iterations());
   };
   state.counters["features_ms"] = mean_ms(features);
   state.counters["heads_ms"] = mean_ms(heads);
-  state.counters["pose_ms"] = mean_ms(pose);
   state.counters["found"] = static_cast<double>(poses) / static_cast<double>(state.iterations());
 }
 BENCHMARK(BM_Localize)

@@ -88,7 +88,9 @@ TEST(GradientHistogramsTest, TheNumberOfThreadsDoesNotChangeTheFeatures) {
   CellFeatures one;
   ASSERT_TRUE(TestExtractor()->Extract(image, 300, one));
   CellFeatures three;
-  ASSERT_TRUE(GradientHistograms::Create(TestConfig(), 3).value()->Extract(image, 300, three));
+  ASSERT_TRUE(GradientHistograms::Create(TestConfig(), std::make_shared<ThreadTeam>(3))
+                  .value()
+                  ->Extract(image, 300, three));
   EXPECT_EQ(one.values, three.values);
   EXPECT_EQ(one.pixels, three.pixels);
 }
