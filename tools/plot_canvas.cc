@@ -125,6 +125,10 @@ double Canvas::TextWidth(const std::string& text, double height) const {
   return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, font_scale, 1, nullptr).width / scale_;
 }
 
+double Canvas::HeightToFit(const std::string& text, double height, double width) const {
+  return height * std::min(1.0, width / std::max(1.0, TextWidth(text, height)));
+}
+
 void Canvas::Picture(const cv::Mat& picture, cv::Rect2d box) {
   const cv::Rect whole = Pixels(box);
   const cv::Rect visible = whole & cv::Rect({}, image_.size());
@@ -203,6 +207,7 @@ void DrawAxes(Canvas& canvas,
               const std::string& y_label) {
   constexpr double kTickDistance = 90.0;
   constexpr double kRowDistance = 45.0;
+  constexpr double kFewestRows = 5.0;  // a round step may be 2.5 times as long: two are left
   constexpr double kGap = 8.0;
   const cv::Rect2d& box = panel.box;
   const cv::Scalar& grid = canvas.theme().grid;
@@ -212,7 +217,7 @@ void DrawAxes(Canvas& canvas,
     canvas.Line({u, box.y}, {u, box.br().y}, grid, 1.0);
     canvas.Text(TickLabel(x, x_step), {u, box.br().y + kGap}, {0.5, 0.0});
   }
-  const double y_step = NiceStep(panel.y.size(), std::max(3.0, box.height / kRowDistance));
+  const double y_step = NiceStep(panel.y.size(), std::max(kFewestRows, box.height / kRowDistance));
   for (const double y : Multiples(y_step, panel.y)) {
     const double v = panel.Pixel({panel.x.low, y}).y;
     canvas.Line({box.x, v}, {box.br().x, v}, grid, 1.0);

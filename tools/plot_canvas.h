@@ -69,6 +69,8 @@ class Canvas {
   void TextWithHalo(const std::string& text, cv::Point2d at, Anchor anchor, const TextStyle& style);
   /// How wide a text is.
   [[nodiscard]] double TextWidth(const std::string& text, double height = 13.0) const;
+  /// The height, at most `height`, in which a text is no wider than `width`.
+  [[nodiscard]] double HeightToFit(const std::string& text, double height, double width) const;
 
   /// Puts a picture (CV_8UC3) into a box.
   void Picture(const cv::Mat& picture, cv::Rect2d box);

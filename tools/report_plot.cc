@@ -480,9 +480,13 @@ cv::Mat DrawDrive(const DriveReport& report, const TopView& top_view, const Figu
       fused.coverage.position_count > 0 ? ChooseEllipses(map, fused) : EllipseChoice();
   const std::array<Place, 2> places = ChoosePlaces(report);
 
-  canvas.Text(
-      report.title, {kLeft, 16.0}, {0.0, 0.5}, {.height = 17.0, .weight = 1.4}, canvas.theme().ink);
-  canvas.Text(DescribeOutcome(report), {kLeft, 42.0}, {0.0, 0.5}, 11.0);
+  canvas.Text(report.title,
+              {kLeft, 16.0},
+              {0.0, 0.5},
+              {.height = canvas.HeightToFit(report.title, 17.0, kPanelWidth), .weight = 1.4},
+              canvas.theme().ink);
+  const std::string outcome = DescribeOutcome(report);
+  canvas.Text(outcome, {kLeft, 42.0}, {0.0, 0.5}, canvas.HeightToFit(outcome, 11.0, kPanelWidth));
   DrawTopView(canvas, map, top_view);
   DrawAxes(canvas, map, "x of the map [m]", "y of the map [m]");
   DrawLegend(canvas, map, report, colours, ellipses);

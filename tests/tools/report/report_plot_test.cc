@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "made_drive.h"
+#include "plot_canvas.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -43,6 +44,36 @@ TEST(ReportPlotTest, AnImageWithoutAPoseIsATickOverTheErrors) {
   ASSERT_TRUE(report);
   const FigureStyle style;
   EXPECT_GT(CountOf(DrawErrors(*report, style), style.colours.outlier), 10);
+}
+
+TEST(ReportPlotTest, ALongTitleStaysInsideTheFigure) {
+  auto report = MadeDrive().Report();
+  ASSERT_TRUE(report);
+  report->title = std::string(200, 'M');
+  const FigureStyle style;
+  const cv::Mat figure = DrawDrive(*report, {}, style);
+  const int margin = figure.cols / 50;
+  EXPECT_EQ(CountOf(figure.colRange(figure.cols - margin, figure.cols), style.theme.ink), 0);
+}
+
+TEST(PlotCanvasTest, AnAxisHasAtLeastTwoNumbers) {
+  const auto numbers = [](double half_size) {
+    Canvas canvas(300.0, 200.0);
+    Panel panel{.box = {80.0, 20.0, 200.0, 120.0}, .x = {0.0, 1.0}, .y = {-half_size, half_size}};
+    DrawAxes(canvas, panel, "", "");
+    // Rows of the strip left of the panel that have ink, in groups.
+    const cv::Mat strip = canvas.Finish().colRange(0, 70).rowRange(0, 146);
+    int groups = 0;
+    bool was_ink = false;
+    for (int row = 0; row < strip.rows; ++row) {
+      const bool is_ink = cv::mean(strip.row(row))[0] < 254.0;
+      if (is_ink && !was_ink) ++groups;
+      was_ink = is_ink;
+    }
+    return groups;
+  };
+  for (double half_size = 0.3; half_size < 40.0; half_size *= 1.1)
+    EXPECT_GE(numbers(half_size), 2) << half_size;
 }
 
 TEST(ReportPlotTest, TheDarkFiguresAreDark) {
