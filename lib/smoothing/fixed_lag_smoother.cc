@@ -233,9 +233,10 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
   keyframe.corrected_turn_rad = drift_.corrected_turn_rad();
   keyframe.corrected_way_m = drift_.corrected_way_m();
   keyframe.X_PK = sample.X_KB;
-  keyframe.covariance_PK = sample.covariance_KB;
+  keyframe.drift_covariance_PK = drift_.Covariance(odometer_m_ - before.odometer_m);
+  keyframe.covariance_PK = sample.covariance_KB + keyframe.drift_covariance_PK;
   keyframe.SetX_WK(before.X_WK() * sample.X_KB);
-  newest_covariance_ = ComposeCovariance(newest_covariance_, sample.X_KB, sample.covariance_KB);
+  newest_covariance_ = ComposeCovariance(newest_covariance_, sample.X_KB, keyframe.covariance_PK);
   window_.keyframes.push_back(std::move(keyframe));
 
   sample.keyframe_id = window_.keyframes.back().id;

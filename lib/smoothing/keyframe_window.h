@@ -25,6 +25,8 @@ struct Keyframe {
   Eigen::Vector3d x_WK = Eigen::Vector3d::Zero();  ///< The estimate X_WK: x, y, unwrapped yaw.
   Pose2 X_PK;                                      ///< The motion from the keyframe before (P).
   Eigen::Matrix3d covariance_PK = Eigen::Matrix3d::Identity();
+  /// The part of it that is there because the odometry's drift was not known better.
+  Eigen::Matrix3d drift_covariance_PK = Eigen::Matrix3d::Zero();
   double odometer_m = 0.0;          ///< The way until here.
   double corrected_turn_rad = 0.0;  ///< Put into the odometry until here, by OdometryDrift.
   double corrected_way_m = 0.0;     ///< Likewise.

@@ -1,5 +1,6 @@
 #include "smoothing/odometry_drift.h"
 
+#include <cmath>
 #include <cstddef>
 
 #include "geometry/angle.h"
@@ -32,6 +33,11 @@ double Shrink(double measured, double variance, double prior) {
   return prior > 0.0 ? measured * prior * prior / (prior * prior + variance) : 0.0;
 }
 
+/// How uncertain it is then.
+double ShrunkSigma(double variance, double prior) {
+  return prior > 0.0 ? prior * std::sqrt(variance / (prior * prior + variance)) : 0.0;
+}
+
 }  // namespace
 
 Pose2 OdometryDrift::Correct(const Pose2& X_AB) {
@@ -40,6 +46,28 @@ Pose2 OdometryDrift::Correct(const Pose2& X_AB) {
   corrected_way_m_ += scale_ * way;
   const Eigen::Vector2d translation = (1.0 + scale_) * X_AB.translation();
   return {translation.x(), translation.y(), X_AB.yaw() + rad_per_m_ * way};
+}
+
+Eigen::Matrix3d OdometryDrift::Covariance(double way_m) const {
+  // The errors of keyframes are independent in the chain, those of a drift are not: both grow to
+  // the same over this way, by which the fixes have said what the drift is.
+  constexpr double kSameAfterM = 100.0;
+  const double scale = sigma_scale_ * sigma_scale_;
+  return kSameAfterM * way_m *
+         Eigen::Vector3d(scale, 0.0, sigma_rad_per_m_ * sigma_rad_per_m_).asDiagonal();
+}
+
+void OdometryDrift::CorrectAnew(const Keyframe& before, Keyframe& keyframe) const {
+  const double way = keyframe.odometer_m - before.odometer_m;
+  if (way <= 0.0) return;
+  const double turn = rad_per_m_ * way - (keyframe.corrected_turn_rad - before.corrected_turn_rad);
+  const double stretch = scale_ - (keyframe.corrected_way_m - before.corrected_way_m) / way;
+  // Half of the turn comes before the way, half after it.
+  const Pose2 half(0.0, 0.0, 0.5 * turn);
+  const Eigen::Vector2d translation = (1.0 + stretch) * keyframe.X_PK.translation();
+  keyframe.X_PK = half * Pose2(translation.x(), translation.y(), keyframe.X_PK.yaw()) * half;
+  keyframe.covariance_PK += Covariance(way) - keyframe.drift_covariance_PK;
+  keyframe.drift_covariance_PK = Covariance(way);
 }
 
 void OdometryDrift::Estimate(const KeyframeWindow& window, const Eigen::Matrix3d& covariance) {
@@ -52,9 +80,11 @@ void OdometryDrift::Estimate(const KeyframeWindow& window, const Eigen::Matrix3d
   const double turn = newest.corrected_turn_rad - oldest.corrected_turn_rad + residuals.turn_rad;
   const double way = newest.corrected_way_m - oldest.corrected_way_m + residuals.way_m;
   // Both ends of the window are known no better than its newest keyframe.
-  const double per_squared_way = 2.0 / (way_m * way_m);
-  rad_per_m_ = Shrink(turn / way_m, per_squared_way * covariance(2, 2), prior_rad_per_m_);
-  scale_ = Shrink(way / way_m, per_squared_way * covariance(0, 0), prior_scale_);
+  const Eigen::Matrix3d variances = 2.0 / (way_m * way_m) * covariance;
+  rad_per_m_ = Shrink(turn / way_m, variances(2, 2), prior_rad_per_m_);
+  scale_ = Shrink(way / way_m, variances(0, 0), prior_scale_);
+  sigma_rad_per_m_ = ShrunkSigma(variances(2, 2), prior_rad_per_m_);
+  sigma_scale_ = ShrunkSigma(variances(0, 0), prior_scale_);
 }
 
 }  // namespace relocd

@@ -40,18 +40,25 @@ void Feed(const MotionLog& log, FixedLagSmoother& smoother, AfterFix after_fix) 
   if (step < log.odometry.size()) feed_odometry(log.odometry[step].time);
 }
 
-/// All keyframes of a log, first as the fixed-lag smoother left them.
+/// All keyframes of a log, first as the fixed-lag smoother left them, with the odometry's drift as
+/// it was known when they left the window: from the way behind them.
 KeyframeWindow CollectKeyframes(const MotionLog& log, const SmootherConfig& config) {
   FixedLagSmoother smoother(config);
   KeyframeWindow all;
-  smoother.OnLeave([&all](const Keyframe& keyframe, std::span<const AttachedFix> fixes) {
-    all.keyframes.push_back(keyframe);
+  const auto collect = [&all, &smoother](const Keyframe& keyframe) {
+    Keyframe corrected = keyframe;
+    if (!all.keyframes.empty()) smoother.drift().CorrectAnew(all.keyframes.back(), corrected);
+    all.keyframes.push_back(corrected);
+  };
+  smoother.OnLeave([&](const Keyframe& keyframe, std::span<const AttachedFix> fixes) {
+    collect(keyframe);
     std::copy(fixes.begin(), fixes.end(), std::back_inserter(all.fixes));
   });
   Feed(log, smoother, [](const Fix&) {});
-  KeyframeWindow rest = std::move(smoother).TakeWindow();
-  std::copy(rest.keyframes.begin(), rest.keyframes.end(), std::back_inserter(all.keyframes));
-  std::copy(rest.fixes.begin(), rest.fixes.end(), std::back_inserter(all.fixes));
+  for (const Keyframe& keyframe : smoother.window().keyframes)
+    collect(keyframe);
+  const auto& fixes = smoother.window().fixes;
+  std::copy(fixes.begin(), fixes.end(), std::back_inserter(all.fixes));
   return all;
 }
 

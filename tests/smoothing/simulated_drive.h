@@ -107,11 +107,13 @@ class DriveSimulator {
   std::uniform_real_distribution<double> uniform_{0.0, 1.0};
 };
 
-/// The simulation's odometry errs independently from step to step, as its covariances say, and so
-/// do its fixes without a bias.
+/// The simulation's odometry errs independently from step to step, as its covariances say and not
+/// all the time alike, and so do its fixes without a bias.
 inline SmootherConfig ConfigForIndependentErrors() {
   SmootherConfig config;
   config.odometry_covariance_factor = 1.0;
+  config.odometry_drift_sigma_rad_per_m = 0.0;
+  config.odometry_scale_sigma = 0.0;
   config.fix_bias_sigmas = 0.0;
   return config;
 }
