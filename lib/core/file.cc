@@ -45,6 +45,31 @@ void SyncFolderOf(const std::string& path) {
   if (fd.valid()) ::fsync(fd.get());
 }
 
+/// Writes beside the file, and renames.
+Result<void> ReplaceFile(const std::string& path, std::string_view bytes) {
+  const std::string temporary = fmt::format("{}.tmp.{}", path, ::getpid());
+  const auto write = [&]() -> Result<void> {
+    const auto fd = OpenToWrite(temporary);
+    if (!fd) return fd.error();
+    if (auto ok = WriteAll(fd->get(), bytes, temporary); !ok) return ok;
+    if (::fsync(fd->get()) != 0) {
+      return SystemError(ErrorKind::kUnavailable, fmt::format("syncing {}", temporary));
+    }
+    if (::rename(temporary.c_str(), path.c_str()) != 0) {
+      return SystemError(ErrorKind::kUnavailable,
+                         fmt::format("renaming {} to {}", temporary, path));
+    }
+    return {};
+  };
+  auto ok = write();
+  if (!ok) {
+    ::unlink(temporary.c_str());
+    return ok;
+  }
+  SyncFolderOf(path);
+  return {};
+}
+
 }  // namespace
 
 Error SystemError(ErrorKind kind, std::string_view doing) {
@@ -73,27 +98,13 @@ Result<void> WriteFile(const std::string& path, std::string_view bytes) {
 }
 
 Result<void> WriteFileAtomically(const std::string& path, std::string_view bytes) {
-  const std::string temporary = fmt::format("{}.tmp.{}", path, ::getpid());
-  const auto write = [&]() -> Result<void> {
-    const auto fd = OpenToWrite(temporary);
-    if (!fd) return fd.error();
-    if (auto ok = WriteAll(fd->get(), bytes, temporary); !ok) return ok;
-    if (::fsync(fd->get()) != 0) {
-      return SystemError(ErrorKind::kUnavailable, fmt::format("syncing {}", temporary));
-    }
-    if (::rename(temporary.c_str(), path.c_str()) != 0) {
-      return SystemError(ErrorKind::kUnavailable,
-                         fmt::format("renaming {} to {}", temporary, path));
-    }
-    return {};
-  };
-  auto ok = write();
-  if (!ok) {
-    ::unlink(temporary.c_str());
-    return ok;
-  }
-  SyncFolderOf(path);
-  return {};
+  std::error_code error;
+  const auto type = std::filesystem::status(path, error).type();
+  using std::filesystem::file_type;
+  if (type != file_type::regular && type != file_type::not_found) return WriteFile(path, bytes);
+  if (!std::filesystem::is_symlink(path, error)) return ReplaceFile(path, bytes);
+  const auto target = std::filesystem::weakly_canonical(path, error);
+  return ReplaceFile(error ? path : target.string(), bytes);
 }
 
 }  // namespace relocd

@@ -1,11 +1,15 @@
 #include "core/file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+
 #include <filesystem>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/unique_fd.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -42,6 +46,22 @@ TEST_F(FileTest, KeepsTheOldFileWhenTheNewOneCannotTakeItsPlace) {
   EXPECT_TRUE(std::filesystem::exists(folder_ + "/state/inside"));
   const auto files = std::filesystem::directory_iterator(folder_);
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
+}
+
+TEST_F(FileTest, WritesIntoWhatIsNoFile) {
+  const std::string pipe = folder_ + "/pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), S_IRUSR | S_IWUSR), 0);
+  const UniqueFd reader(::open(pipe.c_str(), O_RDWR | O_CLOEXEC));
+  ASSERT_TRUE(WriteFileAtomically(pipe, "x"));
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+}
+
+TEST_F(FileTest, LeavesALinkALink) {
+  ASSERT_TRUE(WriteFile(folder_ + "/real", "old"));
+  std::filesystem::create_symlink("real", folder_ + "/link");
+  ASSERT_TRUE(WriteFileAtomically(folder_ + "/link", "new"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ + "/link"));
+  EXPECT_EQ(ReadFile(folder_ + "/real").value(), "new");
 }
 
 TEST_F(FileTest, WritesOverWhatWasThere) {
