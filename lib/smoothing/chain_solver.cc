@@ -145,7 +145,7 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
     const Eigen::Matrix3d gradient = weight * at.by_K.transpose() * information;
     node.information += gradient * at.by_K;
     node.rhs -= gradient * (at.error - at.by_K * node.delta);
-    node.rhs_by_bias += gradient * fix->bias_scale.asDiagonal();
+    node.rhs_by_bias += gradient * fix->covariance_root;
     node.largest_information_m =
         std::max({node.largest_information_m, information(0, 0), information(1, 1)});
     node.largest_information_rad = std::max(node.largest_information_rad, information(2, 2));

@@ -21,14 +21,14 @@ Eigen::Vector2d WhitenedError(const KeyframeWindow& window, const AttachedFix& f
   const Eigen::Vector3d& x_WK =
       window.keyframes[static_cast<std::size_t>(fix.keyframe_id - window.keyframes.front().id)]
           .x_WK;
-  return fix.residual.Linearize(x_WK).error.head<2>() / fix.sigma_m;
+  return fix.covariance_root.topLeftCorner<2, 2>().triangularView<Eigen::Lower>().solve(
+      fix.residual.Linearize(x_WK).error.head<2>());
 }
 
 }  // namespace
 
-/// By how much the fixes scatter more than their covariances say, as a variance, at least 1. From
-/// the better third of them: more than half may be wrong.
-double FixMisfit::ScatterFactor() {
+/// From the better third of the fixes: more than half may be wrong.
+double FixMisfit::Scatter() {
   constexpr double kQuantile = 0.3;
   // Of the squared length of a standard normal vector in the plane.
   const double expected = -2.0 * std::log(1.0 - kQuantile);
@@ -37,15 +37,18 @@ double FixMisfit::ScatterFactor() {
   const auto count = static_cast<double>(squared_.size());
   const auto chosen = squared_.begin() + static_cast<std::ptrdiff_t>(kQuantile * count);
   std::nth_element(squared_.begin(), chosen, squared_.end());
-  return std::max(1.0, (count * *chosen / expected + kWeightOfOne) / (count + kWeightOfOne));
+  return std::min(kMostMisfit,
+                  (count * *chosen / expected + kWeightOfOne) / (count + kWeightOfOne));
 }
 
-double FixMisfit::Estimate(const KeyframeWindow& window, const FixWeighting& weighting) {
+FixErrors FixMisfit::Measure(const KeyframeWindow& window, const FixWeighting& weighting) {
   squared_.clear();
   for (const AttachedFix& fix : window.fixes) {
     if (!fix.is_gated) squared_.push_back(WhitenedError(window, fix).squaredNorm());
   }
-  const double scatter_factor = ScatterFactor();
+  const double scatter = Scatter();
+  // Fixes that scatter less than they say are not believed more for it: their errors have tails.
+  const double scatter_factor = std::max(1.0, scatter);
 
   // The sum over pairs of a weight that falls exponentially, in one pass.
   Eigen::Vector2d recent = Eigen::Vector2d::Zero();
@@ -65,7 +68,8 @@ double FixMisfit::Estimate(const KeyframeWindow& window, const FixWeighting& wei
   }
   const double misfit = (squared / weighting.ExpectedSquaredPull() + kUsualWeight * kUsualMisfit) /
                         (shares + kUsualWeight);
-  return std::min(kMostMisfit, scatter_factor * std::max(1.0, misfit));
+  return {.scatter = scatter,
+          .misfit = std::min(kMostMisfit, scatter_factor * std::max(1.0, misfit))};
 }
 
 }  // namespace relocd

@@ -525,9 +525,10 @@ void FixedLagSmoother::CutBefore(std::int64_t keyframe_id) {
 void FixedLagSmoother::SolveWindow(int max_iterations) {
   if (--fixes_until_misfit_ <= 0) {
     fixes_until_misfit_ = static_cast<int>(window_.fixes.size()) / kMisfitParts;
-    const double misfit = misfit_.Estimate(window_, weighting_);
-    const double change = std::abs(misfit / weighting_.misfit() - 1.0);
-    if (change > kMisfitChange) weighting_.SetMisfit(misfit);
+    const FixErrors errors = misfit_.Measure(window_, weighting_);
+    weighting_.SetScatter(errors.scatter);
+    const double change = std::abs(errors.misfit / weighting_.misfit() - 1.0);
+    if (change > kMisfitChange) weighting_.SetMisfit(errors.misfit);
     drift_.Estimate(window_, newest_covariance_);
   }
   if (chain_.Solve(window_, weighting_, max_iterations)) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "core/check.h"
 
 namespace relocd {
@@ -16,6 +18,17 @@ Eigen::Matrix3d TotalCovariance(const AttachedFix& fix) {
   total.topLeftCorner<2, 2>() +=
       0.5 * fix.covariance_KF.topLeftCorner<2, 2>().trace() * Eigen::Matrix2d::Identity();
   return total;
+}
+
+/// The lower triangular root of the fix's own covariance, along W's axes.
+Eigen::Matrix3d CovarianceRoot(const Fix& fix) {
+  if (fix.has_heading) {
+    const Eigen::Matrix3d rotation = Pose2(0.0, 0.0, fix.X_WB.yaw()).Adjoint();
+    return (rotation * fix.covariance * rotation.transpose()).eval().llt().matrixL();
+  }
+  Eigen::Matrix3d root = Eigen::Matrix3d::Zero();
+  root.topLeftCorner<2, 2>() = fix.covariance.topLeftCorner<2, 2>().eval().llt().matrixL();
+  return root;
 }
 
 /// Means over Gaussian errors of `dimension`, s the squared length and w(s) the Cauchy weight.
@@ -78,10 +91,7 @@ AttachedFix* UpdateSharesOfOne(AttachedFix* first,
 
 void PrepareResidual(AttachedFix& fix) {
   const Eigen::Matrix3d covariance = TotalCovariance(fix);
-  fix.sigma_m = std::sqrt(0.5 * covariance.topLeftCorner<2, 2>().trace());
-  const double own_sigma_m = std::sqrt(0.5 * fix.fix.covariance.topLeftCorner<2, 2>().trace());
-  const double heading_sigma_rad = fix.fix.has_heading ? std::sqrt(fix.fix.covariance(2, 2)) : 0.0;
-  fix.bias_scale << own_sigma_m, own_sigma_m, heading_sigma_rad;
+  fix.covariance_root = CovarianceRoot(fix.fix);
   fix.residual = fix.fix.has_heading
                      ? AbsolutePoseResidual::OfPose(fix.fix.X_WB, fix.X_KF, covariance)
                      : AbsolutePoseResidual::OfPosition(

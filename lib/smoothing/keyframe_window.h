@@ -52,18 +52,17 @@ struct AttachedFix {
       false;              ///< X_KF is a prediction, to be replaced when the odometry is there.
   bool is_gated = false;  ///< Kept, but without influence.
   double share = 0.0;     ///< Of it that is news, by UpdateShares.
-  double sigma_m = 0.0;   ///< Of its position, the motion from the keyframe included.
-  /// What a bias of one is in it: the sigmas of its own position, in m, and heading, in rad.
-  Eigen::Vector3d bias_scale = Eigen::Vector3d::Zero();
+  /// The lower triangular root of its own covariance along W's axes: what a bias of one is in it.
+  Eigen::Matrix3d covariance_root = Eigen::Matrix3d::Zero();
   AbsolutePoseResidual residual;
 };
 
-/// Fills in `residual` and `sigma_m` from the other members.
+/// Fills in `residual` and `covariance_root` from the other members.
 void PrepareResidual(AttachedFix& fix);
 
 /// Neighbouring fixes err together by a slowly varying bias: a Gauss-Markov process along W's axes.
 struct FixBias {
-  double sigmas = 0.0;   ///< Its standard deviation, as a part of each fix's own.
+  double sigmas = 0.0;   ///< Its standard deviation, as a part of each fix's own error.
   double time_s = 10.0;  ///< After which 1/e of it is left.
 };
 
@@ -81,7 +80,8 @@ class FixWeighting {
   [[nodiscard]] double cauchy_scale_sigmas() const { return cauchy_scale_sigmas_; }
   [[nodiscard]] double correlation_time_s() const { return correlation_time_s_; }
 
-  [[nodiscard]] double BiasVariance() const { return bias_.sigmas * bias_.sigmas; }
+  /// As a part of what the fixes' covariances say.
+  [[nodiscard]] double BiasVariance() const { return scatter_ * bias_.sigmas * bias_.sigmas; }
   /// The part of a bias that is left after a time.
   [[nodiscard]] double BiasKept(double seconds) const { return std::exp(-seconds / bias_.time_s); }
 
@@ -98,6 +98,8 @@ class FixWeighting {
   /// All fixes tell so many times less than if they erred independently.
   [[nodiscard]] double misfit() const { return misfit_; }
   void SetMisfit(double misfit) { misfit_ = misfit; }
+  /// The fixes' errors are so many times, as a variance, what their covariances say.
+  void SetScatter(double scatter) { scatter_ = scatter; }
 
   /// Mean square of a fix's pull, its whitened position error times its weight, when errors are
   /// Gaussian.
@@ -111,6 +113,7 @@ class FixWeighting {
   double correction_without_heading_;
   double expected_squared_pull_;
   double misfit_ = 1.0;
+  double scatter_ = 1.0;
 };
 
 /// What is known of a keyframe from those before it.

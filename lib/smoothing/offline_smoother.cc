@@ -243,10 +243,12 @@ std::vector<SmootherEstimate> SmoothAll(const MotionLog& log, const SmootherConf
   const ConsensusOptions consensus_options{.radius_sigmas = config.relocalization_radius_sigmas,
                                            .min_radius_m = config.relocalization_min_radius_m};
   FixMisfit misfit;
-  weighting.SetMisfit(misfit.Estimate(all, weighting));
+  weighting.SetMisfit(misfit.Measure(all, weighting).misfit);
   SolveAll(weighting, consensus_options, all);
-  // The whole log's own misfit, from estimates that are near enough to the best ones.
-  weighting.SetMisfit(misfit.Estimate(all, weighting));
+  // The whole log's own errors, from estimates that are near enough to the best ones.
+  const FixErrors errors = misfit.Measure(all, weighting);
+  weighting.SetMisfit(errors.misfit);
+  weighting.SetScatter(errors.scatter);
   SolveBatch(all, weighting, kBatchIterations);
   const std::vector<Eigen::Matrix3d> covariances =
       ChainSolver(all.keyframes.size()).SmoothedCovariances(all, weighting);

@@ -129,8 +129,8 @@ struct SmootherConfig {
           ">= 0; fixes closer than this share the information of one");
     visit("fix_bias_sigmas",
           self.fix_bias_sigmas,
-          ">= 0; of a slowly varying part of the fixes' errors, as a part of their own sigmas: the "
-          "reported covariance allows for it");
+          ">= 0; of a slowly varying part of the fixes' errors, as a part of them as they are "
+          "measured: the reported covariance allows for it");
     visit("fix_bias_time_s", self.fix_bias_time_s, "> 0; after which 1/e of it is left");
     visit("max_fixes_per_keyframe",
           self.max_fixes_per_keyframe,

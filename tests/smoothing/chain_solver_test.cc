@@ -166,7 +166,7 @@ DenseEquations SetUpDense(KeyframeWindow& window) {
         kQuadratic.BaseWeight(fix) * jacobian.transpose() * fix.residual.information();
     const auto i = static_cast<Eigen::Index>(3 * fix.keyframe_id);
     dense.information.block<3, 3>(i, i) += gradient * jacobian;
-    dense.rhs_by_bias.block<3, 3>(i, i) += gradient * fix.bias_scale.asDiagonal();
+    dense.rhs_by_bias.block<3, 3>(i, i) += gradient * fix.covariance_root;
   }
   return dense;
 }

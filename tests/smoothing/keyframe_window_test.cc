@@ -3,12 +3,14 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "smoothing/bent_window.h"
+#include "support/eigen_matchers.h"
 #include "support/random.h"
 
 namespace relocd {
@@ -29,6 +31,23 @@ std::vector<double> Shares(const KeyframeWindow& window) {
   for (const AttachedFix& fix : window.fixes)
     shares.push_back(fix.share);
   return shares;
+}
+
+/// Else the allowance for a bias would make a fix that is sure across the street unsure of it.
+TEST(KeyframeWindowTest, ABiasOfOneIsAsLargeInEachDirectionAsTheFixSays) {
+  AttachedFix fix;
+  fix.fix.X_WB = Pose2(0.0, 0.0, std::numbers::pi / 2.0);
+  fix.fix.covariance << 4.0, 0.2, 0.01, 0.2, 0.09, 0.02, 0.01, 0.02, 0.01;
+  PrepareResidual(fix);
+  Eigen::Matrix3d along_W;  // x is the body's -y, y its x
+  along_W << 0.09, -0.2, -0.02, -0.2, 4.0, 0.01, -0.02, 0.01, 0.01;
+  EXPECT_THAT(fix.covariance_root * fix.covariance_root.transpose(), IsNear(along_W, 1e-12));
+
+  fix.fix.has_heading = false;
+  PrepareResidual(fix);
+  Eigen::Matrix3d position = Eigen::Matrix3d::Zero();
+  position.topLeftCorner<2, 2>() << 4.0, 0.2, 0.2, 0.09;
+  EXPECT_THAT(fix.covariance_root * fix.covariance_root.transpose(), IsNear(position, 1e-12));
 }
 
 TEST(KeyframeWindowTest, FixesOfOnePlaceCountAsOneAtMost) {
