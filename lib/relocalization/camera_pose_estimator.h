@@ -85,7 +85,8 @@ struct CameraPoseResult {
 };
 
 /// The pose of a camera from what its pixels are believed to show: P3P in a preemptive RANSAC,
-/// local refinement of the best hypotheses, robust refinement of the best on everything.
+/// local refinement of the best hypotheses, robust refinement of the best on everything. Minimal
+/// sets are drawn from the more confident half of the correspondences.
 ///
 /// The result is a function of the arguments, bit for bit, and the time is bounded by the options.
 /// Correspondences that are not finite support nothing, and are otherwise ignored.

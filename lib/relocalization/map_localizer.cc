@@ -71,7 +71,8 @@ void MapLocalizer::TryRegion(std::size_t region,
   const MonotonicTime predicted = clock();
   correspondences_.clear();
   for (const ScenePrediction& prediction : predictions) {
-    correspondences_.push_back({.pixel = prediction.pixel, .p_WP = prediction.p_WP});
+    correspondences_.push_back(
+        {.pixel = prediction.pixel, .p_WP = prediction.p_WP, .confidence = prediction.confidence});
   }
   CameraPoseOptions options = options_;
   options.calibration = CalibrationOf(map_.regions[region].calibration);

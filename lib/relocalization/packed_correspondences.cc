@@ -1,6 +1,7 @@
 #include "relocalization/packed_correspondences.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -18,6 +19,7 @@ constexpr std::uint64_t kShuffleCounters = std::uint64_t{1} << 62;
 
 bool IsUsable(const Correspondence& correspondence) {
   return correspondence.pixel.allFinite() && correspondence.p_WP.allFinite() &&
+         std::isfinite(correspondence.confidence) &&
          correspondence.p_WP.cwiseAbs().maxCoeff() < kMaxCoordinate;
 }
 
@@ -35,6 +37,23 @@ Eigen::Vector3d Middle(std::span<const Correspondence> correspondences,
     middle[axis] = *median;
   }
   return middle;
+}
+
+/// The indices of what is at least as large as the middle; of few, all.
+std::vector<std::uint32_t> UpperHalf(const std::vector<float>& values) {
+  constexpr std::size_t kFew = 50;
+  float middle = -std::numeric_limits<float>::infinity();
+  if (values.size() > kFew) {
+    std::vector<float> sorted = values;
+    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, at);
+    middle = *at;
+  }
+  std::vector<std::uint32_t> upper;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] >= middle) upper.push_back(static_cast<std::uint32_t>(i));
+  }
+  return upper;
 }
 
 }  // namespace
@@ -63,6 +82,8 @@ PackedCorrespondences::PackedCorrespondences(std::span<const Correspondence> cor
                              data_.data() + 2 * stride_,
                              data_.data() + 3 * stride_,
                              data_.data() + 4 * stride_};
+  std::vector<float> confidences;
+  confidences.reserve(order.size());
   for (const std::uint32_t i : order) {
     const std::optional<Eigen::Vector2d> ray = camera.Unproject(correspondences[i].pixel);
     if (!ray) continue;
@@ -71,8 +92,10 @@ PackedCorrespondences::PackedCorrespondences(std::span<const Correspondence> cor
       columns[axis][size_] = p_MP[axis];
     columns[3][size_] = static_cast<float>(ray->x() * focal_.x());
     columns[4][size_] = static_cast<float>(ray->y() * focal_.y());
+    confidences.push_back(correspondences[i].confidence);
     ++size_;
   }
+  likely_ = UpperHalf(confidences);
   // So far from every projection that the square of the squared error is infinite, and the score 0.
   constexpr float kNowhere = 1e12F;
   std::fill(columns[3] + size_, columns[3] + stride_, kNowhere);

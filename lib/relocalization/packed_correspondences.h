@@ -46,6 +46,10 @@ class PackedCorrespondences {
     return Eigen::Vector3d(u()[i] / focal_.x(), v()[i] / focal_.y(), 1.0).normalized();
   }
 
+  /// Indices of the more confident half, and of those that are as confident as its last; of few
+  /// correspondences, all.
+  [[nodiscard]] std::span<const std::uint32_t> likely() const { return likely_; }
+
   [[nodiscard]] const Eigen::Vector2d& focal() const { return focal_; }  ///< (fx, fy), px.
   [[nodiscard]] const Eigen::Vector3d& p_WM() const { return p_WM_; }
 
@@ -55,6 +59,7 @@ class PackedCorrespondences {
   Eigen::Vector2d focal_;
   Eigen::Vector3d p_WM_ = Eigen::Vector3d::Zero();
   std::vector<float> data_;
+  std::vector<std::uint32_t> likely_;
 };
 
 }  // namespace relocd

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
 
 #include "core/counter_random.h"
 #include "relocalization/p3p.h"
@@ -14,17 +15,18 @@ namespace {
 constexpr std::size_t kSampleSize = 4;
 using Sample = std::array<std::size_t, kSampleSize>;
 
-/// Four indices below `size`; nothing if two of them are the same.
+/// Four of the indices; nothing if two of them are the same.
 std::optional<Sample> DrawSample(const CounterRandom& random,
                                  std::uint64_t draw,
-                                 std::size_t size) {
-  const auto bound = static_cast<std::uint32_t>(size);
+                                 std::span<const std::uint32_t> indices) {
+  const auto bound = static_cast<std::uint32_t>(indices.size());
   const std::uint64_t first = random.Bits(2 * draw);
   const std::uint64_t second = random.Bits(2 * draw + 1);
-  const Sample sample{CounterRandom::Below(bound, static_cast<std::uint32_t>(first)),
-                      CounterRandom::Below(bound, static_cast<std::uint32_t>(first >> 32)),
-                      CounterRandom::Below(bound, static_cast<std::uint32_t>(second)),
-                      CounterRandom::Below(bound, static_cast<std::uint32_t>(second >> 32))};
+  const Sample sample{
+      indices[CounterRandom::Below(bound, static_cast<std::uint32_t>(first))],
+      indices[CounterRandom::Below(bound, static_cast<std::uint32_t>(first >> 32))],
+      indices[CounterRandom::Below(bound, static_cast<std::uint32_t>(second))],
+      indices[CounterRandom::Below(bound, static_cast<std::uint32_t>(second >> 32))]};
   for (std::size_t i = 1; i < kSampleSize; ++i) {
     if (std::find(sample.begin(), sample.begin() + i, sample[i]) != sample.begin() + i) {
       return std::nullopt;
@@ -70,7 +72,7 @@ void Draw(const PackedCorrespondences& correspondences,
   const CounterRandom random(seed);
   while (result.hypotheses < options.hypotheses && result.tries < options.max_tries) {
     const auto draw = static_cast<std::uint64_t>(result.tries++);
-    const std::optional<Sample> sample = DrawSample(random, draw, correspondences.size());
+    const std::optional<Sample> sample = DrawSample(random, draw, correspondences.likely());
     if (!sample) continue;
     const P3pSolutions solutions = SolveSample(correspondences, *sample);
     if (solutions.degenerate) ++result.degenerate_tries;
@@ -93,7 +95,7 @@ PoseRansacResult FindPoses(const PackedCorrespondences& correspondences,
                            std::uint64_t seed) {
   PoseRansacResult result;
   result.best.reserve(static_cast<std::size_t>(options.hypotheses) + more.size());
-  if (correspondences.size() >= kSampleSize) Draw(correspondences, options, seed, result);
+  if (correspondences.likely().size() >= kSampleSize) Draw(correspondences, options, seed, result);
   for (const CameraFromWorld& X_CM : more) {
     result.best.push_back({.X_CM = X_CM, .order = static_cast<std::size_t>(result.hypotheses++)});
   }
