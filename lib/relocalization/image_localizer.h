@@ -45,8 +45,9 @@ class ImageLocalizer {
   /// The sha256 of the map in hexadecimal.
   [[nodiscard]] virtual const std::string& map_id() const = 0;
 
-  /// @param prior  where the camera is expected, if that is known: tells where to look first, and
-  ///         competes on equal terms with what the image says.
+  /// @param prior  where the camera is expected, if that is known: tells where to look first,
+  ///         competes on equal terms with what the image says, and a pose that agrees with it needs
+  ///         less support.
   /// @param seed  of the random draws.
   /// @return kInvalidInput when the image has not the size of the map's camera.
   virtual Result<ImageLocalization> Localize(const GrayImage& image,

@@ -17,6 +17,19 @@ PoseCalibration CalibrationOf(const RegionCalibration& region) {
           .min_confidence = region.confidence_threshold};
 }
 
+/// A wrong pose comes out where the camera is expected by a rare chance only, so that one which
+/// does is believed with this share of the support that it needs elsewhere.
+constexpr double kExpectedShare = 0.65;
+
+bool IsWhereExpected(const Pose3& X_WC, const std::optional<Pose3>& expected_WC) {
+  constexpr double kReachM = 2.0;
+  constexpr double kReachRad = 0.1;
+  if (!expected_WC) return false;
+  const Pose3 difference = expected_WC->Inverse() * X_WC;
+  return difference.translation().norm() < kReachM &&
+         AngleBetween(expected_WC->rotation(), X_WC.rotation()) < kReachRad;
+}
+
 /// A pose before none, and more support before less.
 bool IsBetterPose(const CameraPoseResult& a, const CameraPoseResult& b) {
   const bool a_ok = a.status == CameraPoseStatus::kOk;
@@ -76,7 +89,13 @@ void MapLocalizer::TryRegion(std::size_t region,
   }
   CameraPoseOptions options = options_;
   options.calibration = CalibrationOf(map_.regions[region].calibration);
+  const double min_confidence = options.calibration.min_confidence;
+  if (prior) options.calibration.min_confidence *= kExpectedShare;
   CameraPoseResult pose = EstimateCameraPose(correspondences_, camera_, options, prior, seed);
+  if (pose.status == CameraPoseStatus::kOk && pose.confidence < min_confidence &&
+      !IsWhereExpected(pose.X_WC, prior)) {
+    pose.status = CameraPoseStatus::kLowConfidence;
+  }
   if (pose.status == CameraPoseStatus::kOk && !IsNearTraining(map_.regions[region], pose.X_WC)) {
     pose.status = CameraPoseStatus::kOffRoute;
   }

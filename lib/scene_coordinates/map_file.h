@@ -33,7 +33,7 @@ struct RegionCalibration {
   double covariance_factor = 1.0;   ///< The estimate's 6x6 covariance is multiplied by it, >= 1.
   double sigma_floor_m = 0.0;       ///< Added in squares to each direction's standard deviation.
   double sigma_floor_rad = 0.0;     ///< The same about each axis.
-  double confidence_threshold = 0;  ///< Poses of less confidence are no poses, in [0, 1].
+  double confidence_threshold = 0;  ///< In [0, 1]; with less there is no pose unless expected.
 };
 
 /// One stretch of the route, and the head that knows it.

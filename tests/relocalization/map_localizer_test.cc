@@ -1,5 +1,6 @@
 #include "relocalization/map_localizer.h"
 
+#include <optional>
 #include <utility>
 
 #include <gmock/gmock.h>
@@ -130,9 +131,9 @@ TEST(MapLocalizerTest, LooksWhereTheCameraIsExpected) {
 TEST(MapLocalizerTest, APoseFarFromWhereTheRegionWasLearnedIsNone) {
   const Eigen::Vector3f here = kPose.translation().cast<float>();
   const struct {
-    const char* what;
+    const char* what = "";
     TrainingPose learned;
-    CameraPoseStatus expected;
+    CameraPoseStatus expected = CameraPoseStatus::kOk;
   } cases[] = {
       {"beside", {here + Eigen::Vector3f(20.0F, 0.0F, 2.0F), 0.5F}, CameraPoseStatus::kOk},
       {"far", {here + Eigen::Vector3f(20.0F, 20.0F, 0.0F), 0.0F}, CameraPoseStatus::kOffRoute},
@@ -158,6 +159,35 @@ TEST(MapLocalizerTest, AppliesTheCalibrationOfTheRegion) {
           ->Localize(MakeTexturedImage(kWidth, kHeight, 1), std::nullopt, 1, TickingClock());
   ASSERT_TRUE(localization);
   EXPECT_EQ(localization->pose.status, CameraPoseStatus::kLowConfidence);
+}
+
+TEST(MapLocalizerTest, APoseWhereItIsExpectedNeedsLessSupport) {
+  const auto moved = [](double right_m, double turn_rad) {
+    return kPose * Pose3::Exp((Vector6d() << right_m, 0.0, 0.5, 0.0, turn_rad, 0.0).finished());
+  };
+  const struct {
+    const char* what = "";
+    double needed = 0.0;  ///< Times the support that the pose has.
+    std::optional<Pose3> expected_WC;
+    CameraPoseStatus status = CameraPoseStatus::kOk;
+  } cases[] = {
+      {"where expected", 1.25, moved(1.0, 0.05), CameraPoseStatus::kOk},
+      {"nowhere expected", 1.25, std::nullopt, CameraPoseStatus::kLowConfidence},
+      {"expected elsewhere", 1.25, moved(3.0, 0.0), CameraPoseStatus::kLowConfidence},
+      {"expected to look elsewhere", 1.25, moved(0.0, 0.2), CameraPoseStatus::kLowConfidence},
+      {"hardly any support", 1.8, moved(1.0, 0.05), CameraPoseStatus::kLowConfidence}};
+  const GrayImage image = MakeTexturedImage(kWidth, kHeight, 1);
+  SceneMap map = MakeMap();
+  const auto found = MakeLocalizer(map)->Localize(image, std::nullopt, 1, TickingClock());
+  ASSERT_TRUE(found);
+  for (const auto& [what, needed, expected_WC, status] : cases) {
+    map.regions.front().calibration.confidence_threshold = needed * found->pose.confidence;
+    map.regions.front().training_poses = {{kPose.translation().cast<float>(), 0.0F}};
+    const auto prior = expected_WC ? std::optional(CameraPrior{*expected_WC}) : std::nullopt;
+    const auto localization = MakeLocalizer(map)->Localize(image, prior, 1, TickingClock());
+    ASSERT_TRUE(localization);
+    EXPECT_EQ(localization->pose.status, status) << what;
+  }
 }
 
 TEST(MapLocalizerTest, SaysWhichMapIsMissing) {
