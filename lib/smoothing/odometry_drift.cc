@@ -79,8 +79,9 @@ void OdometryDrift::Estimate(const KeyframeWindow& window, const Eigen::Matrix3d
   const Residuals residuals = SumResiduals(window);
   const double turn = newest.corrected_turn_rad - oldest.corrected_turn_rad + residuals.turn_rad;
   const double way = newest.corrected_way_m - oldest.corrected_way_m + residuals.way_m;
-  // Both ends of the window are known no better than its newest keyframe.
-  const Eigen::Matrix3d variances = 2.0 / (way_m * way_m) * covariance;
+  // Both ends of the window are known no better than its newest keyframe, and the fixes there err
+  // together: twice its sigmas each.
+  const Eigen::Matrix3d variances = 2.0 * 4.0 / (way_m * way_m) * covariance;
   rad_per_m_ = Shrink(turn / way_m, variances(2, 2), prior_rad_per_m_);
   scale_ = Shrink(way / way_m, variances(0, 0), prior_scale_);
   sigma_rad_per_m_ = ShrunkSigma(variances(2, 2), prior_rad_per_m_);
