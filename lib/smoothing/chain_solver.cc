@@ -69,7 +69,7 @@ void ChainSolver::FixesChanged(std::int64_t first_id, std::int64_t last_id) {
     nodes_[static_cast<std::size_t>(id - oldest)].are_fixes_new = true;
 }
 
-void ChainSolver::Synchronize(const KeyframeWindow& window) {
+void ChainSolver::Synchronize(const KeyframeWindow& window, const FixWeighting& weighting) {
   while (!nodes_.empty() && nodes_.front().id < window.keyframes.front().id) {
     nodes_.pop_front();
     if (first_dirty_ > 0) --first_dirty_;
@@ -79,7 +79,9 @@ void ChainSolver::Synchronize(const KeyframeWindow& window) {
     Node node;
     node.id = keyframe.id;
     node.reference = keyframe.x_WK;
-    if (i > 0) node.seconds_before = ToSeconds(keyframe.time - window.keyframes[i - 1].time);
+    if (i > 0) {
+      node.bias_kept = weighting.BiasKept(ToSeconds(keyframe.time - window.keyframes[i - 1].time));
+    }
     node.residual = keyframe.MotionResidual();
     nodes_.push_back(node);
     first_dirty_ = std::min(first_dirty_, i);
@@ -164,7 +166,7 @@ ChainSolver::Prediction ChainSolver::FromPrior(const KeyframeWindow& window) con
   return {mean, AlongMap(window.prior->pose.covariance, X_WM.yaw()), window.prior->bias};
 }
 
-ChainSolver::Prediction ChainSolver::Predict(std::size_t i, const FixWeighting& weighting) {
+ChainSolver::Prediction ChainSolver::Predict(std::size_t i) {
   Node& before = nodes_[i - 1];
   const Node& node = nodes_[i];
   const LinearMotion& motion = node.motion;
@@ -174,7 +176,7 @@ ChainSolver::Prediction ChainSolver::Predict(std::size_t i, const FixWeighting& 
   before.gain = motion.Move(before.covariance).transpose() * predicted.covariance.inverse();
   before.offset = before.mean - before.gain * predicted.mean;
   predicted.bias.covariance = Symmetric(motion.MoveBoth(before.bias.covariance));
-  predicted.bias.cross = weighting.BiasKept(node.seconds_before) * motion.Move(before.bias.cross);
+  predicted.bias.cross = node.bias_kept * motion.Move(before.bias.cross);
   return predicted;
 }
 
@@ -210,7 +212,7 @@ void ChainSolver::Eliminate(const KeyframeWindow& window,
                             double damping,
                             std::size_t end) {
   for (std::size_t i = first_dirty_; i < end; ++i) {
-    const Prediction predicted = i == 0 ? FromPrior(window) : Predict(i, weighting);
+    const Prediction predicted = i == 0 ? FromPrior(window) : Predict(i);
     Correct(predicted, weighting.misfit(), damping, nodes_[i]);
   }
   first_dirty_ = std::max(first_dirty_, end);
@@ -335,7 +337,7 @@ bool ChainSolver::IterateDamped(KeyframeWindow& window,
 }
 
 bool ChainSolver::Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations) {
-  Synchronize(window);
+  Synchronize(window, weighting);
   if (weighting.misfit() != misfit_) {
     misfit_ = weighting.misfit();
     first_dirty_ = 0;
@@ -356,11 +358,11 @@ Eigen::Matrix3d ChainSolver::NewestCovariance(const FixWeighting& weighting) con
 
 void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting) {
   RELOCD_CHECK(window.keyframes.size() > 1, "the newest keyframe must stay");
-  Synchronize(window);
+  Synchronize(window, weighting);
   if (nodes_[0].are_fixes_new) LinearizeFixes(window, weighting, nodes_[0]);
   if (nodes_[1].is_motion_new) LinearizeMotion(1);
   if (first_dirty_ == 0) Eliminate(window, weighting, 0.0, 1);
-  const Prediction next = Predict(1, weighting);
+  const Prediction next = Predict(1);
   const Eigen::Vector3d x_WM = nodes_[1].reference + next.mean;
   window.prior = KeyframePrior{.pose = {.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
                                         .covariance = AlongMap(next.covariance, -x_WM.z())},
@@ -391,14 +393,14 @@ ChainSolver::SmoothedBias ChainSolver::BiasBefore(std::size_t i,
   bias.later = Symmetric(
       gain * (by_next_bias * by_next_bias.transpose() + after.later + mixed + mixed.transpose()) *
       gain.transpose());
-  bias.cross = weighting.BiasKept(next.seconds_before) * gain * (by_next_bias + after.cross);
+  bias.cross = next.bias_kept * gain * (by_next_bias + after.cross);
   return bias;
 }
 
 std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& window,
                                                               const FixWeighting& weighting) {
   Invalidate();
-  Synchronize(window);
+  Synchronize(window, weighting);
   Linearize(window, weighting);
   Eliminate(window, weighting, 0.0, nodes_.size());
   // Rauch, Tung and Striebel (1965), backwards.
@@ -408,7 +410,7 @@ std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& wi
   SmoothedBias bias;
   with_bias.back() = smoothed.back() + weighting.BiasVariance() * nodes_.back().bias.covariance;
   for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
-    const Prediction predicted = Predict(i + 1, weighting);
+    const Prediction predicted = Predict(i + 1);
     const Eigen::Matrix3d& gain = nodes_[i].gain;
     smoothed[i] = Symmetric(nodes_[i].covariance +
                             gain * (smoothed[i + 1] - predicted.covariance) * gain.transpose());

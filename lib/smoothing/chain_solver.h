@@ -98,7 +98,7 @@ class ChainSolver {
 
     /// The motion from the node before.
     LinearMotion motion;
-    double seconds_before = 0.0;  ///< Since the node before.
+    double bias_kept = 0.0;  ///< Of a bias of the fixes, since the node before.
 
     /// The fixes: information * delta = rhs, without the misfit.
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
@@ -145,14 +145,14 @@ class ChainSolver {
                                         const SmoothedBias& after,
                                         const FixWeighting& weighting) const;
 
-  void Synchronize(const KeyframeWindow& window);
+  void Synchronize(const KeyframeWindow& window, const FixWeighting& weighting);
   void Linearize(KeyframeWindow& window, const FixWeighting& weighting);
   void LinearizeMotion(std::size_t i);
   void LinearizeFixes(KeyframeWindow& window, const FixWeighting& weighting, Node& node);
 
   [[nodiscard]] Prediction FromPrior(const KeyframeWindow& window) const;
   /// What the node before says of node i; keeps in it what leads back.
-  Prediction Predict(std::size_t i, const FixWeighting& weighting);
+  Prediction Predict(std::size_t i);
   void Correct(const Prediction& predicted, double misfit, double damping, Node& node);
   void Eliminate(const KeyframeWindow& window,
                  const FixWeighting& weighting,
