@@ -47,8 +47,14 @@ constexpr double kLeastVariance = 1e-10;
 /// Least distance and turn that make a body "moving" for the keyframes by time.
 constexpr double kStandstill = 0.02;
 
+/// On earth: 1e300 m is finite, and its square is not.
+bool IsUsable(const Eigen::Vector2d& position_m) {
+  constexpr double kFarthest = 1e8;
+  return position_m.squaredNorm() < kFarthest * kFarthest;
+}
+
 bool IsUsable(const Pose2& pose) {
-  return pose.translation().allFinite() && std::isfinite(pose.yaw());
+  return IsUsable(pose.translation()) && std::isfinite(pose.yaw());
 }
 
 /// Sane values only: a variance of 1e308 is finite, and its square is not.
@@ -62,7 +68,7 @@ bool IsUsableCovariance(const Eigen::Matrix<double, Size, Size>& covariance) {
 
 bool IsUsable(const Fix& fix) {
   if (fix.has_heading) return IsUsable(fix.X_WB) && IsUsableCovariance(fix.covariance);
-  return fix.X_WB.translation().allFinite() &&
+  return IsUsable(fix.X_WB.translation()) &&
          IsUsableCovariance(Eigen::Matrix2d(fix.covariance.topLeftCorner<2, 2>()));
 }
 

@@ -318,7 +318,12 @@ TEST(FixedLagSmootherTest, RefusesWhatIsNotFinite) {
   EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
   fix.covariance(0, 0) = 1e308;
   EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
-  EXPECT_EQ(smoother.counters().fixes_invalid, 3);
+  fix = drive.log.fixes.back();
+  fix.X_WB = Pose2(0.0, 1e300, 0.0);  // finite, and its square is not
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
+  fix.has_heading = false;
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kInvalid);
+  EXPECT_EQ(smoother.counters().fixes_invalid, 5);
 
   OdometryStep step = drive.log.odometry.back();
   EXPECT_FALSE(smoother.AddOdometry(step));  // the same time once more
@@ -327,10 +332,14 @@ TEST(FixedLagSmootherTest, RefusesWhatIsNotFinite) {
   const auto refused = smoother.AddOdometry(step);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::kInvalidInput);
-  EXPECT_EQ(smoother.counters().odometry_refused, 2);
+  step.X_BprevB = Pose2(1e300, 0.0, 0.0);
+  EXPECT_FALSE(smoother.AddOdometry(step));
+  EXPECT_EQ(smoother.counters().odometry_refused, 3);
   EXPECT_EQ(smoother.Estimate().X_WB.translation(), before.translation());
 
   EXPECT_FALSE(smoother.Reset({.X_WB = Pose2(), .covariance = Eigen::Matrix3d::Zero()}));
+  EXPECT_FALSE(
+      smoother.Reset({.X_WB = Pose2(-1e300, 0.0, 0.0), .covariance = Eigen::Matrix3d::Identity()}));
 }
 
 TEST(FixedLagSmootherTest, RefusesWhatComesBeforeOrLongAfterTheOdometry) {
