@@ -101,6 +101,8 @@ void AddSimFixes(CLI::App& app, SimCommand& command) {
   add("--outlier-reach-m", values.outlier_reach_m, "by up to so much");
   add("--bias-sigma-m", values.bias_sigma_m, "of an error of each coordinate that lasts");
   add("--bias-correlation-s", values.bias_correlation_s, "after so long it is down to 1/e");
+  add("--mounting-yaw-rad", values.mounting_yaw_rad, "by which the headings are too far left");
+  add("--time-offset-s", values.time_offset_s, "by which the times are late");
   fixes.callback([options, &command] { command = [options] { return WriteFixes(*options); }; });
 }
 

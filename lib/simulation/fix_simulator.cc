@@ -21,7 +21,8 @@ class FixErrors {
     const double kept = std::exp(-since_last_s / options_.bias_correlation_s);
     bias_m_ = kept * bias_m_ + Draw(options_.bias_sigma_m * std::sqrt(1.0 - kept * kept));
     Eigen::Vector2d error_m = bias_m_ + Draw(options_.sigma_m);
-    double yaw = X_WB.yaw() + options_.heading_sigma_rad * normal_(engine_);
+    double yaw =
+        X_WB.yaw() + options_.mounting_yaw_rad + options_.heading_sigma_rad * normal_(engine_);
     const bool is_outlier = uniform_(engine_) < options_.outlier_share;
     if (is_outlier) {
       const double direction = 2.0 * std::numbers::pi * uniform_(engine_);
@@ -61,7 +62,9 @@ Result<void> FixSimulationOptions::Validate() const {
                              Field{"outlier_share", outlier_share, 0.0, 1.0},
                              Field{"outlier_reach_m", outlier_reach_m, 0.0, 1e6},
                              Field{"bias_sigma_m", bias_sigma_m, 0.0, 1e3},
-                             Field{"bias_correlation_s", bias_correlation_s, 1e-3, 1e6}}) {
+                             Field{"bias_correlation_s", bias_correlation_s, 1e-3, 1e6},
+                             Field{"mounting_yaw_rad", mounting_yaw_rad, -3.0, 3.0},
+                             Field{"time_offset_s", time_offset_s, -10.0, 10.0}}) {
     if (field.value >= field.low && field.value <= field.high) continue;
     return Error{
         ErrorKind::kInvalidInput,
@@ -87,6 +90,9 @@ Result<std::vector<SimulatedFix>> SimulateFixes(const Trajectory2& X_WBs,
     due_ns = (fixes.empty() ? time_ns : due_ns) + period_ns;
     fixes.push_back(errors.Measure(pose.time_ns, pose.X_WB, since_last_s));
   }
+  const auto late_ns = std::llround(1e9 * options.time_offset_s);
+  for (SimulatedFix& fix : fixes)
+    fix.time_ns += late_ns;
   return fixes;
 }
 

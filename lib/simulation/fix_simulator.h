@@ -22,6 +22,8 @@ struct FixSimulationOptions {
   double outlier_reach_m = 50.0;     ///< In each direction alike, the heading anything.
   double bias_sigma_m = 0.0;         ///< Of an error of each coordinate that lasts.
   double bias_correlation_s = 10.0;  ///< After so long it is down to 1/e.
+  double mounting_yaw_rad = 0.0;     ///< By which the camera looks to the left of what is believed.
+  double time_offset_s = 0.0;        ///< By which the fixes' times are late.
 
   /// @return kInvalidInput, naming the field, its value and what is allowed.
   [[nodiscard]] Result<void> Validate() const;

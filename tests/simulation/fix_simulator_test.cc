@@ -107,6 +107,20 @@ TEST(FixSimulatorTest, ABiasLastsAndFades) {
   EXPECT_NEAR(Correlation(errors, 200) / Correlation(errors, 0), 0.0, 0.05);
 }
 
+TEST(FixSimulatorTest, ATurnedAndLateCameraChangesHeadingsAndTimesAlone) {
+  FixSimulationOptions options{.heading_sigma_rad = 0.01};
+  const auto straight = SimulateFixes(Truth(50), options).value();
+  options.mounting_yaw_rad = 0.1;
+  options.time_offset_s = 0.08;
+  const auto turned = SimulateFixes(Truth(50), options).value();
+  ASSERT_EQ(turned.size(), straight.size());
+  for (std::size_t i = 0; i < turned.size(); ++i) {
+    EXPECT_EQ(turned[i].time_ns - straight[i].time_ns, 80'000'000);
+    EXPECT_EQ(turned[i].X_WB.x(), straight[i].X_WB.x());
+    EXPECT_NEAR(WrapAngle(turned[i].X_WB.yaw() - straight[i].X_WB.yaw()), 0.1, 1e-12);
+  }
+}
+
 TEST(FixSimulatorTest, TheSeedDecidesAll) {
   const FixSimulationOptions options{.seed = 9, .outlier_share = 0.5, .bias_sigma_m = 1.0};
   FixSimulationOptions other = options;
