@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <map>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +38,19 @@ Result<SmootherConfig> ReadConfig(const Options& options) {
   return config.localization.smoother;
 }
 
+void ReportCamera(const CameraOffset& camera) {
+  if (!camera.IsSought()) return;
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  const Eigen::Vector2d sigmas = camera.covariance.diagonal().cwiseSqrt();
+  fmt::print(stderr,
+             "camera: looks {:.3f} +- {:.3f} deg farther to the left than believed, its times are "
+             "{:.4f} +- {:.4f} s late\n",
+             kDegrees * camera.estimate.x(),
+             kDegrees * sigmas.x(),
+             camera.estimate.y(),
+             sigmas.y());
+}
+
 void Report(const MotionLog& log, const std::vector<SmootherEstimate>& estimates) {
   std::map<std::string, int> rows;
   for (const SmootherEstimate& estimate : estimates)
@@ -52,9 +66,11 @@ Result<void> Run(const Options& options) {
   if (!config) return config.error();
   const auto log = ReadMotionLog(options.odometry, options.fixes, *config);
   if (!log) return log.error();
+  CameraOffset camera;
   const std::vector<SmootherEstimate> estimates =
-      options.smoothed ? SmoothAll(*log, *config) : SmoothCausally(*log, *config);
+      options.smoothed ? SmoothAll(*log, *config, &camera) : SmoothCausally(*log, *config, &camera);
   Report(*log, estimates);
+  ReportCamera(camera);
   const std::string text = FormatEstimatesCsv(estimates);
   if (options.out.empty()) {
     fmt::print("{}", text);

@@ -280,7 +280,8 @@ std::optional<Fix> SmootherNode::ToFix(const camera_pose_t& message) {
   return Fix{.time = FromNanoseconds(message.mono_ns),
              .X_WB = planar.X_WB,
              .has_heading = true,
-             .covariance = planar.covariance};
+             .covariance = planar.covariance,
+             .p_BC = X_BC.translation().head<2>()};
 }
 
 void SmootherNode::ChangeMap(const std::string& map_id) {
@@ -478,6 +479,13 @@ void SmootherNode::AddFigures(const SmootherEstimate& estimate, NodeStatus& stat
   status.Add("fix_p99_ms", fix_latency_ms_.Percentile(0.99));
   status.Add("odometry_drift_rad_per_m", smoother_.drift().rad_per_m());
   status.Add("odometry_scale", smoother_.drift().scale());
+  const CameraOffset& camera = smoother_.camera();
+  if (camera.IsSought()) {
+    status.Add("camera_yaw_rad", camera.estimate.x());
+    status.Add("camera_yaw_sigma_rad", std::sqrt(camera.covariance(0, 0)));
+    status.Add("camera_time_s", camera.estimate.y());
+    status.Add("camera_time_sigma_s", std::sqrt(camera.covariance(1, 1)));
+  }
   status.Add("fix_misfit", smoother_.weighting().misfit());
   status.Add("time_since_fix_s", estimate.time_since_fix_s.value_or(-1.0));
   status.Add("position_sigma_m",

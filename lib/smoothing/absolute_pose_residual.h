@@ -48,6 +48,13 @@ class AbsolutePoseResidual {
     return residual;
   }
 
+  /// The same measurement of another place.
+  [[nodiscard]] AbsolutePoseResidual At(const Pose2& X_KF) const {
+    AbsolutePoseResidual residual = *this;
+    residual.X_KF_ = X_KF;
+    return residual;
+  }
+
   [[nodiscard]] Linearization Linearize(const Eigen::Vector3d& x_WK) const {
     const double cosine = std::cos(x_WK.z());
     const double sine = std::sin(x_WK.z());

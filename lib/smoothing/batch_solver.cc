@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <ceres/loss_function.h>
+#include <ceres/normal_prior.h>
 #include <ceres/problem.h>
 #include <ceres/sized_cost_function.h>
 #include <ceres/solver.h>
@@ -19,6 +21,7 @@ namespace relocd {
 namespace {
 
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using RowMajor3By2 = Eigen::Matrix<double, 3, 2, Eigen::RowMajor>;
 
 /// A relative pose's residual, as Ceres wants it: with unit variances.
 class MotionCost final : public ceres::SizedCostFunction<3, 3, 3> {
@@ -42,17 +45,20 @@ class MotionCost final : public ceres::SizedCostFunction<3, 3, 3> {
   Eigen::Matrix3d weight_;
 };
 
+/// A root of an information matrix. Not a Cholesky factor: without a heading it is singular.
+Eigen::Matrix3d RootOf(const Eigen::Matrix3d& information) {
+  const Eigen::LDLT<Eigen::Matrix3d> factor(information);
+  const Eigen::Matrix3d upper = factor.matrixU();
+  const Eigen::Vector3d roots = factor.vectorD().cwiseMax(0.0).cwiseSqrt();
+  return roots.asDiagonal() * upper *
+         Eigen::Matrix3d(factor.transpositionsP() * Eigen::Matrix3d::Identity());
+}
+
 /// An absolute pose's residual, likewise.
 class FixCost final : public ceres::SizedCostFunction<3, 3> {
  public:
-  explicit FixCost(const AbsolutePoseResidual& residual) : residual_(residual) {
-    // Not a Cholesky factor: without a heading the information is singular.
-    const Eigen::LDLT<Eigen::Matrix3d> factor(residual.information());
-    const Eigen::Matrix3d upper = factor.matrixU();
-    const Eigen::Vector3d roots = factor.vectorD().cwiseMax(0.0).cwiseSqrt();
-    weight_ = roots.asDiagonal() * upper *
-              Eigen::Matrix3d(factor.transpositionsP() * Eigen::Matrix3d::Identity());
-  }
+  explicit FixCost(const AbsolutePoseResidual& residual)
+      : residual_(residual), weight_(RootOf(residual.information())) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const auto at = residual_.Linearize(Eigen::Map<const Eigen::Vector3d>(x[0]));
@@ -68,6 +74,41 @@ class FixCost final : public ceres::SizedCostFunction<3, 3> {
   AbsolutePoseResidual residual_;
   Eigen::Matrix3d weight_;
 };
+
+/// That of a fix by a camera whose offset is estimated.
+class CameraFixCost final : public ceres::SizedCostFunction<3, 3, 2> {
+ public:
+  /// Borrows `fix`, which must outlive it.
+  explicit CameraFixCost(const AttachedFix& fix)
+      : fix_(fix), weight_(RootOf(fix.residual.information())) {}
+
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const Eigen::Map<const Eigen::Vector3d> x_WK(x[0]);
+    const auto at =
+        fix_.residual.At(fix_.MotionWith(Eigen::Map<const Eigen::Vector2d>(x[1]))).Linearize(x_WK);
+    Eigen::Map<Eigen::Vector3d> weighted(residual);
+    weighted = weight_ * at.error;
+    if (jacobians == nullptr) return true;
+    if (jacobians[0] != nullptr) Eigen::Map<RowMajor3>{jacobians[0]} = weight_ * at.by_K;
+    if (jacobians[1] != nullptr) {
+      Eigen::Map<RowMajor3By2>{jacobians[1]} = weight_ * fix_.ErrorByCamera(x_WK.z());
+    }
+    return true;
+  }
+
+ private:
+  const AttachedFix& fix_;
+  Eigen::Matrix3d weight_;
+};
+
+/// Holds what is not to be estimated where it is.
+constexpr double kHeldSigma = 1e-9;
+
+ceres::CostFunction* MakeCameraPrior(const CameraOffset& camera) {
+  const Eigen::Vector2d sigmas = camera.prior_sigmas.cwiseMax(kHeldSigma);
+  return new ceres::NormalPrior(sigmas.cwiseInverse().asDiagonal().toDenseMatrix(),
+                                Eigen::Vector2d::Zero());
+}
 
 ceres::Solver::Options SolverOptions(int max_iterations, double trust_region_radius) {
   ceres::Solver::Options options;
@@ -109,12 +150,25 @@ class WindowProblem {
                                 window.keyframes[i - 1].x_WK.data(),
                                 window.keyframes[i].x_WK.data());
     }
+    const bool is_camera_sought = window.camera.IsSought();
+    if (is_camera_sought) {
+      problem_.AddResidualBlock(
+          MakeCameraPrior(window.camera), nullptr, window.camera.estimate.data());
+    }
     losses_.reserve(window.fixes.size());
     for (const AttachedFix& fix : window.fixes) {
       if (fix.share <= 0.0) continue;
       losses_.push_back(std::make_unique<ceres::ScaledLoss>(
           &cauchy_, weighting.BaseWeight(fix) / weighting.misfit(), ceres::DO_NOT_TAKE_OWNERSHIP));
-      AddFix(fix.residual, losses_.back().get(), window.Get(fix.keyframe_id));
+      Keyframe& keyframe = window.Get(fix.keyframe_id);
+      if (!is_camera_sought) {
+        AddFix(fix.residual, losses_.back().get(), keyframe);
+        continue;
+      }
+      problem_.AddResidualBlock(new CameraFixCost(fix),
+                                losses_.back().get(),
+                                keyframe.x_WK.data(),
+                                window.camera.estimate.data());
     }
   }
 
@@ -151,13 +205,19 @@ bool SolveBatch(KeyframeWindow& window, const FixWeighting& weighting, int max_i
   before.reserve(window.keyframes.size());
   for (const Keyframe& keyframe : window.keyframes)
     before.push_back(keyframe.x_WK);
+  const Eigen::Vector2d camera_before = window.camera.estimate;
 
-  bool usable = WindowProblem(window, weighting).Solve(max_iterations);
+  bool usable =
+      WindowProblem(window, weighting).Solve(max_iterations) && window.camera.estimate.allFinite();
+  const Eigen::Vector2d camera = std::exchange(window.camera.estimate, camera_before);
   for (Keyframe& keyframe : window.keyframes) {
     usable = usable && keyframe.x_WK.allFinite();
     keyframe.x_WK.z() = WrapAngle(keyframe.x_WK.z());
   }
-  if (usable) return true;
+  if (usable) {
+    window.SetCameraOffset(camera);
+    return true;
+  }
   for (std::size_t i = 0; i < before.size(); ++i)
     window.keyframes[i].x_WK = before[i];
   return false;

@@ -26,6 +26,11 @@ constexpr double kSettledLength = 1e-4;
 constexpr double kSettledTurn = 1e-5;
 /// A step that turns a keyframe by more is looked at: has it lowered the cost?
 constexpr double kDoubtfulTurn = 0.1;
+/// A camera's offset that would move by a smaller part of its sigma is left, and all fixes with it.
+constexpr double kLeastOffset = 0.1;
+/// A keyframe that leaves takes this part of what is known of the offset with it: a camera that was
+/// knocked is seen within some thousand keyframes.
+constexpr double kForgotten = 5e-4;
 /// Information with which a damped step holds the estimates, of 1 m and 0.1 rad.
 const Eigen::Vector3d kDampingInformation(1.0, 1.0, 100.0);
 
@@ -52,12 +57,38 @@ Eigen::Matrix3d AlongMap(const Eigen::Matrix3d& covariance, double yaw) {
   return Symmetric(rotation * covariance * rotation.transpose());
 }
 
+/// The covariance of the camera's offset if fixes erred independently, also where a prior of 0 says
+/// that there is none.
+Eigen::Matrix2d CameraPosterior(const Eigen::Vector2d& prior_sigmas,
+                                const Eigen::Matrix2d& information) {
+  const Eigen::Matrix2d sigmas = prior_sigmas.asDiagonal();
+  return sigmas * (Eigen::Matrix2d::Identity() + sigmas * information * sigmas).inverse() * sigmas;
+}
+
+Eigen::Matrix2d CameraCovariance(const Eigen::Matrix2d& posterior,
+                                 const CameraKnowledge& known,
+                                 const FixWeighting& weighting) {
+  return posterior + weighting.BiasVariance() * posterior * known.bias_covariance * posterior;
+}
+
 }  // namespace
 
-ChainSolver::ChainSolver(std::size_t capacity) : nodes_(capacity) {}
+/// Leaves what is known of the camera to the window's next keyframe, but for a little.
+void ChainSolver::ForgetCamera(const CameraState& next, KeyframeWindow& window) {
+  constexpr double kKept = 1.0 - kForgotten;
+  window.prior->camera = {.by_camera = next.effect.by_camera,
+                          .bias_cross = kKept * next.effect.bias_cross};
+  window.camera.before_window = {.information = kKept * next.known.information,
+                                 .rhs = kKept * next.known.rhs,
+                                 .bias_covariance = kKept * kKept * next.known.bias_covariance,
+                                 .bias_cross = kKept * next.known.bias_cross};
+}
+
+ChainSolver::ChainSolver(std::size_t capacity) : nodes_(capacity), cameras_(capacity) {}
 
 void ChainSolver::Invalidate() {
   nodes_.clear();
+  cameras_.clear();
   first_dirty_ = 0;
 }
 
@@ -72,6 +103,7 @@ void ChainSolver::FixesChanged(std::int64_t first_id, std::int64_t last_id) {
 void ChainSolver::Synchronize(const KeyframeWindow& window, const FixWeighting& weighting) {
   while (!nodes_.empty() && nodes_.front().id < window.keyframes.front().id) {
     nodes_.pop_front();
+    cameras_.pop_front();
     if (first_dirty_ > 0) --first_dirty_;
   }
   for (std::size_t i = nodes_.size(); i < window.keyframes.size(); ++i) {
@@ -84,6 +116,7 @@ void ChainSolver::Synchronize(const KeyframeWindow& window, const FixWeighting& 
     }
     node.residual = keyframe.MotionResidual();
     nodes_.push_back(node);
+    cameras_.push_back({});
     first_dirty_ = std::min(first_dirty_, i);
   }
   RELOCD_CHECK(
@@ -136,6 +169,8 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
   node.weighted_at = node.estimate();
   node.are_fixes_new = false;
   node.has_fixes = false;
+  CameraNode& camera = cameras_[static_cast<std::size_t>(node.id - nodes_.front().id)];
+  if (window.camera.IsSought()) camera = {};
   for (AttachedFix* fix = window.FirstFix(node.id);
        fix != window.fixes.end() && fix->keyframe_id == node.id;
        ++fix) {
@@ -148,6 +183,15 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
     node.information += gradient * at.by_K;
     node.rhs -= gradient * (at.error - at.by_K * node.delta);
     node.rhs_by_bias += gradient * fix->covariance_root;
+    if (window.camera.IsSought()) {
+      const ByCameraOffset by_camera = fix->ErrorByCamera(node.weighted_at.z());
+      const Eigen::Matrix<double, 2, 3> camera_gradient =
+          weight * by_camera.transpose() * information;
+      camera.pose_rhs_by_camera -= gradient * by_camera;
+      camera.information += camera_gradient * by_camera;
+      camera.rhs_by_bias += camera_gradient * fix->covariance_root;
+      camera.rhs -= camera_gradient * (at.error - at.by_K * node.delta);
+    }
     node.largest_information_m =
         std::max({node.largest_information_m, information(0, 0), information(1, 1)});
     node.largest_information_rad = std::max(node.largest_information_rad, information(2, 2));
@@ -207,6 +251,63 @@ void ChainSolver::Correct(const Prediction& predicted, double misfit, double dam
   node.bias.covariance = Symmetric(part * kept.transpose() + node.bias.cross * by_bias.transpose());
 }
 
+ChainSolver::CameraState ChainSolver::PredictCamera(const KeyframeWindow& window,
+                                                    std::size_t i) const {
+  if (i == 0) {
+    const CameraEffect effect = window.prior ? window.prior->camera : CameraEffect();
+    return {effect, window.camera.before_window};
+  }
+  const Eigen::Vector3d& arm = nodes_[i].motion.arm;
+  CameraState predicted = cameras_[i - 1].state;
+  const CameraEffect before = predicted.effect;
+  predicted.effect.by_camera += arm * before.by_camera.row(2);
+  predicted.effect.bias_cross += before.bias_cross.col(2) * arm.transpose();
+  predicted.known.bias_cross *= nodes_[i].bias_kept;
+  return predicted;
+}
+
+/// What the fixes pull at the predicted pose, less what the pose gives way, is left for the
+/// camera's offset: the Schur complement of all poses until here. The pose is corrected before.
+void ChainSolver::CorrectCamera(const KeyframeWindow& window,
+                                const FixWeighting& weighting,
+                                const Prediction& predicted,
+                                std::size_t i) {
+  const CameraState before = PredictCamera(window, i);
+  const Node& node = nodes_[i];
+  const CameraNode& fixes = cameras_[i];
+  CameraState& state = cameras_[i].state;
+  state = before;
+  if (!node.has_fixes) return;
+  const double misfit = weighting.misfit();
+  const Eigen::Matrix3d information = node.information / misfit;
+  const Eigen::Matrix3d kept = Eigen::Matrix3d::Identity() - node.covariance * information;
+  const ByCameraOffset rhs_by_camera = fixes.pose_rhs_by_camera / misfit;
+  const ByCameraOffset& by_camera = before.effect.by_camera;
+  const ByCameraOffset after = kept * by_camera + node.covariance * rhs_by_camera;
+  state.effect.by_camera = after;
+  state.known.information += fixes.information / misfit - rhs_by_camera.transpose() * by_camera -
+                             after.transpose() * (rhs_by_camera - information * by_camera);
+  state.known.rhs += fixes.rhs / misfit + rhs_by_camera.transpose() * predicted.mean +
+                     after.transpose() * (node.rhs / misfit - information * predicted.mean);
+
+  // The error of the rhs is that before + by_pose * (that of the prediction) + by_now * bias.
+  using ByPose = Eigen::Matrix<double, 2, 3>;
+  const ByPose by_pose = rhs_by_camera.transpose() - after.transpose() * information;
+  const ByPose by_now = (fixes.rhs_by_bias + after.transpose() * node.rhs_by_bias) / misfit;
+  const FixBiasEffect& bias = predicted.bias;
+  const ByPose with_pose =
+      before.effect.bias_cross + by_pose * bias.covariance + by_now * bias.cross.transpose();
+  const ByPose with_bias = before.known.bias_cross + by_pose * bias.cross;
+  const Eigen::Matrix2d mixed =
+      with_bias * by_now.transpose() + before.effect.bias_cross * by_pose.transpose();
+  state.known.bias_covariance += by_pose * bias.covariance * by_pose.transpose() +
+                                 by_now * by_now.transpose() + mixed + mixed.transpose();
+  state.known.bias_cross = with_bias + by_now;
+  const Eigen::Matrix3d by_bias = node.covariance * node.rhs_by_bias / misfit;
+  state.effect.bias_cross =
+      with_pose * kept.transpose() + state.known.bias_cross * by_bias.transpose();
+}
+
 void ChainSolver::Eliminate(const KeyframeWindow& window,
                             const FixWeighting& weighting,
                             double damping,
@@ -214,6 +315,7 @@ void ChainSolver::Eliminate(const KeyframeWindow& window,
   for (std::size_t i = first_dirty_; i < end; ++i) {
     const Prediction predicted = i == 0 ? FromPrior(window) : Predict(i);
     Correct(predicted, weighting.misfit(), damping, nodes_[i]);
+    if (window.camera.IsSought()) CorrectCamera(window, weighting, predicted, i);
   }
   first_dirty_ = std::max(first_dirty_, end);
 }
@@ -236,6 +338,21 @@ ChainSolver::Step ChainSolver::Substitute(std::size_t first_new) {
     node.delta = delta;
   }
   return step;
+}
+
+bool ChainSolver::MoveCameraOffset(KeyframeWindow& window, const FixWeighting& weighting) {
+  CameraOffset& camera = window.camera;
+  if (!camera.IsSought()) return false;
+  const CameraKnowledge& known = cameras_.back().state.known;
+  const Eigen::Matrix2d posterior = CameraPosterior(camera.prior_sigmas, known.information);
+  camera.covariance = CameraCovariance(posterior, known, weighting);
+  const Eigen::Vector2d offset = posterior * (known.rhs + known.information * camera.estimate);
+  const Eigen::Array2d moved = (offset - camera.estimate).array().abs();
+  if (!(moved > kLeastOffset * camera.covariance.diagonal().array().sqrt()).any()) return false;
+  window.SetCameraOffset(offset);
+  for (Node& node : nodes_)
+    node.are_fixes_new = true;
+  return true;
 }
 
 void ChainSolver::WriteEstimates(KeyframeWindow& window) const {
@@ -346,14 +463,30 @@ bool ChainSolver::Solve(KeyframeWindow& window, const FixWeighting& weighting, i
     Invalidate();
     return false;
   }
+  if (MoveCameraOffset(window, weighting) && !IterateUndamped(window, weighting, max_iterations)) {
+    Invalidate();
+    return false;
+  }
   WriteEstimates(window);
   return true;
 }
 
-Eigen::Matrix3d ChainSolver::NewestCovariance(const FixWeighting& weighting) const {
+Eigen::Matrix3d ChainSolver::NewestCovariance(const KeyframeWindow& window,
+                                              const FixWeighting& weighting) const {
   const Node& newest = nodes_.back();
-  return AlongMap(newest.covariance + weighting.BiasVariance() * newest.bias.covariance,
-                  -newest.estimate().z());
+  Eigen::Matrix3d covariance =
+      newest.covariance + weighting.BiasVariance() * newest.bias.covariance;
+  if (window.camera.IsSought()) {
+    const CameraState& state = cameras_.back().state;
+    const ByCameraOffset& by_camera = state.effect.by_camera;
+    const Eigen::Matrix3d mixed =
+        weighting.BiasVariance() * by_camera *
+        CameraPosterior(window.camera.prior_sigmas, state.known.information) *
+        state.effect.bias_cross;
+    covariance +=
+        by_camera * window.camera.covariance * by_camera.transpose() + mixed + mixed.transpose();
+  }
+  return AlongMap(covariance, -newest.estimate().z());
 }
 
 void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting) {
@@ -366,7 +499,9 @@ void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& 
   const Eigen::Vector3d x_WM = nodes_[1].reference + next.mean;
   window.prior = KeyframePrior{.pose = {.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
                                         .covariance = AlongMap(next.covariance, -x_WM.z())},
-                               .bias = next.bias};
+                               .bias = next.bias,
+                               .camera = {}};
+  if (window.camera.IsSought()) ForgetCamera(PredictCamera(window, 1), window);
   window.PopFront();
 }
 
@@ -408,14 +543,22 @@ std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& wi
   std::vector<Eigen::Matrix3d> with_bias(nodes_.size());
   smoothed.back() = nodes_.back().covariance;
   SmoothedBias bias;
-  with_bias.back() = smoothed.back() + weighting.BiasVariance() * nodes_.back().bias.covariance;
+  const CameraKnowledge& known = cameras_.back().state.known;
+  window.camera.covariance = CameraCovariance(
+      CameraPosterior(window.camera.prior_sigmas, known.information), known, weighting);
+  ByCameraOffset by_camera = cameras_.back().state.effect.by_camera;
+  with_bias.back() = smoothed.back() + weighting.BiasVariance() * nodes_.back().bias.covariance +
+                     by_camera * window.camera.covariance * by_camera.transpose();
   for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
     const Prediction predicted = Predict(i + 1);
     const Eigen::Matrix3d& gain = nodes_[i].gain;
     smoothed[i] = Symmetric(nodes_[i].covariance +
                             gain * (smoothed[i + 1] - predicted.covariance) * gain.transpose());
     bias = BiasBefore(i, bias, weighting);
-    with_bias[i] = smoothed[i] + weighting.BiasVariance() * bias.Covariance(nodes_[i].bias);
+    const CameraEffect after = PredictCamera(window, i + 1).effect;
+    by_camera = cameras_[i].state.effect.by_camera + gain * (by_camera - after.by_camera);
+    with_bias[i] = smoothed[i] + weighting.BiasVariance() * bias.Covariance(nodes_[i].bias) +
+                   by_camera * window.camera.covariance * by_camera.transpose();
   }
   for (std::size_t i = 0; i < with_bias.size(); ++i)
     with_bias[i] = AlongMap(with_bias[i], -nodes_[i].reference.z());

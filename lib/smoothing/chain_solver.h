@@ -26,7 +26,9 @@ namespace relocd {
 /// Covariances are carried instead of information: a vague prior next to a stiff chain loses no
 /// digits. Fixes are weighted as if they erred independently; what a bias that lasts does to these
 /// estimates is carried along and added to their covariances (a filter that "considers" it:
-/// Schmidt, 1966). Allocates nothing once it has seen its largest window. Thread-bound.
+/// Schmidt, 1966). How a camera's offset moves them is carried along too, and what that tells of
+/// the offset (a bias beside a filter: Friedland, 1969). Allocates nothing once it has seen its
+/// largest window. Thread-bound.
 class ChainSolver {
  public:
   /// @param capacity  the most keyframes that there will be without an allocation.
@@ -41,21 +43,24 @@ class ChainSolver {
   /// shares of the fixes must be set.
   ///
   /// Gauss and Newton's step; where that would turn a keyframe far and not lower the cost, damped
-  /// ones. The same calls give the same bits.
+  /// ones. The camera's offset follows when it is known better by a tenth of its sigma. The same
+  /// calls give the same bits.
   ///
   /// @return whether the estimates are finite; if not, they are as before.
   bool Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
 
   /// The covariance of the newest keyframe's right perturbation given all in the window, as of the
-  /// last Solve: the last block of the elimination, and what the fixes' bias adds.
-  [[nodiscard]] Eigen::Matrix3d NewestCovariance(const FixWeighting& weighting) const;
+  /// last Solve: the last block of the elimination, and what the fixes' bias and the camera's
+  /// offset add.
+  [[nodiscard]] Eigen::Matrix3d NewestCovariance(const KeyframeWindow& window,
+                                                 const FixWeighting& weighting) const;
 
   /// Takes the oldest keyframe and its fixes out of the window, and leaves what they say of the
   /// next one as its prior. The window must have two keyframes.
   void MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting);
 
   /// The covariances of all keyframes' right perturbations given all in the window, at the window's
-  /// estimates.
+  /// estimates; and that of the camera's offset, written into the window.
   std::vector<Eigen::Matrix3d> SmoothedCovariances(KeyframeWindow& window,
                                                    const FixWeighting& weighting);
 
@@ -125,6 +130,25 @@ class ChainSolver {
     FixBiasEffect bias;
   };
 
+  /// What is known of the camera's offset from a keyframe and those before it, and what it does to
+  /// the keyframe's mean.
+  struct CameraState {
+    CameraEffect effect;
+    CameraKnowledge known;
+  };
+
+  /// A keyframe's part of the equations that concerns the camera's offset, apart from the node:
+  /// where none is sought, the nodes are nearer together in the cache.
+  struct CameraNode {
+    /// The fixes' part, without the misfit: with the keyframe as it is, information * offset = rhs.
+    ByCameraOffset pose_rhs_by_camera = ByCameraOffset::Zero();
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
+    Eigen::Matrix<double, 2, 3> rhs_by_bias = Eigen::Matrix<double, 2, 3>::Zero();
+
+    CameraState state;
+  };
+
   /// The largest changes of one step.
   struct Step {
     double length_m = 0.0;
@@ -153,12 +177,20 @@ class ChainSolver {
   [[nodiscard]] Prediction FromPrior(const KeyframeWindow& window) const;
   /// What the node before says of node i; keeps in it what leads back.
   Prediction Predict(std::size_t i);
-  void Correct(const Prediction& predicted, double misfit, double damping, Node& node);
+  static void Correct(const Prediction& predicted, double misfit, double damping, Node& node);
   void Eliminate(const KeyframeWindow& window,
                  const FixWeighting& weighting,
                  double damping,
                  std::size_t end);
   Step Substitute(std::size_t first_new);
+  [[nodiscard]] CameraState PredictCamera(const KeyframeWindow& window, std::size_t i) const;
+  void CorrectCamera(const KeyframeWindow& window,
+                     const FixWeighting& weighting,
+                     const Prediction& predicted,
+                     std::size_t i);
+  static void ForgetCamera(const CameraState& next, KeyframeWindow& window);
+  /// @return whether the offset is another, and so all fixes are to be linearised anew.
+  bool MoveCameraOffset(KeyframeWindow& window, const FixWeighting& weighting);
   void WriteEstimates(KeyframeWindow& window) const;
 
   bool IterateUndamped(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
@@ -168,8 +200,9 @@ class ChainSolver {
   [[nodiscard]] bool AreFinite() const;
 
   SlidingVector<Node> nodes_;
-  std::size_t first_dirty_ = 0;  ///< From here on the elimination is to be done again.
-  double misfit_ = 0.0;          ///< Of the elimination.
+  SlidingVector<CameraNode> cameras_;  ///< Of the same keyframes.
+  std::size_t first_dirty_ = 0;        ///< From here on the elimination is to be done again.
+  double misfit_ = 0.0;                ///< Of the elimination.
 };
 
 }  // namespace relocd

@@ -15,6 +15,7 @@ struct Fix {
   /// With a heading: 3x3 of X_WB's right perturbation (x, y, yaw), in m and rad. Without: the upper
   /// left 2x2 is that of the position, along W's axes.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  Eigen::Vector2d p_BC = Eigen::Vector2d::Zero();  ///< Of the camera that it is from.
 };
 
 }  // namespace relocd

@@ -117,6 +117,12 @@ FixWeighting WeightingOf(const SmootherConfig& config) {
           {.sigmas = config.fix_bias_sigmas, .time_s = config.fix_bias_time_s}};
 }
 
+CameraOffset CameraOf(const SmootherConfig& config) {
+  CameraOffset camera{.prior_sigmas = {config.camera_yaw_sigma_rad, config.camera_time_sigma_s}};
+  camera.covariance = camera.prior_sigmas.cwiseAbs2().asDiagonal();
+  return camera;
+}
+
 FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
     : config_(config),
       weighting_(WeightingOf(config)),
@@ -125,6 +131,7 @@ FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
       history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
       chain_(static_cast<std::size_t>(config.window_keyframes) + 1),
       drift_(config.odometry_drift_sigma_rad_per_m, config.odometry_scale_sigma) {
+  window_.camera = CameraOf(config);
   const auto keyframes = static_cast<std::size_t>(config.window_keyframes) + 1;
   window_.keyframes.Reserve(keyframes);
   window_.fixes.Reserve(keyframes * kUsualFixesPerKeyframe);
@@ -148,7 +155,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
     keyframe.gated_fixes = 0;
   }
   window_.fixes.clear();
-  extrapolated_fixes_ = 0;
+  provisional_fixes_ = 0;
   chain_.Invalidate();
   voters_.clear();
   window_.last_removed_fix.reset();
@@ -214,7 +221,7 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
     AddKeyframe(sample);
   }
   history_.Push(sample);
-  ReattachExtrapolated();
+  ReattachProvisional();
   return {};
 }
 
@@ -257,9 +264,9 @@ void FixedLagSmoother::RemoveOldest() {
   const std::int64_t id = window_.keyframes.front().id;
   const AttachedFix* const end = window_.FirstFix(id + 1);
   if (on_leave_) on_leave_(window_.keyframes.front(), {window_.fixes.begin(), end});
-  extrapolated_fixes_ -= static_cast<int>(
+  provisional_fixes_ -= static_cast<int>(
       std::count_if(window_.fixes.begin(), window_.FirstFix(id + 1), [](const AttachedFix& fix) {
-        return fix.is_extrapolated;
+        return fix.is_provisional;
       }));
   const bool had_prior = window_.prior.has_value();
   chain_.MarginalizeOldest(window_, weighting_);
@@ -267,38 +274,52 @@ void FixedLagSmoother::RemoveOldest() {
   if (!is_started_ && !had_prior) window_.prior.reset();
 }
 
-void FixedLagSmoother::ReattachExtrapolated() {
-  if (extrapolated_fixes_ == 0) return;
-  for (AttachedFix& fix : window_.fixes) {
-    if (!fix.is_extrapolated || fix.fix.time > history_.newest().time) continue;
+void FixedLagSmoother::ReattachProvisional() {
+  int remaining = provisional_fixes_;
+  for (std::size_t i = window_.fixes.size(); remaining > 0 && i-- > 0;) {
+    AttachedFix& fix = window_.fixes[i];
+    if (!fix.is_provisional) continue;
+    --remaining;
+    if (fix.fix.time > history_.newest().time) continue;
     const auto sample = history_.At(fix.fix.time);
     if (!sample || !window_.Has(sample->keyframe_id)) continue;
-    AttachedFix attached = Attach(fix.fix, *sample);
-    attached.is_gated = fix.is_gated;
+    std::optional<AttachedFix> attached = Attach(fix.fix, *sample);
+    if (!attached) continue;
+    attached->is_gated = fix.is_gated;
     --(fix.is_gated ? window_.Get(fix.keyframe_id).gated_fixes
                     : window_.Get(fix.keyframe_id).fixes);
-    ++(fix.is_gated ? window_.Get(attached.keyframe_id).gated_fixes
-                    : window_.Get(attached.keyframe_id).fixes);
-    const std::int64_t id = std::min(fix.keyframe_id, attached.keyframe_id);
-    fix = attached;
-    --extrapolated_fixes_;
+    ++(fix.is_gated ? window_.Get(attached->keyframe_id).gated_fixes
+                    : window_.Get(attached->keyframe_id).fixes);
+    const std::int64_t id = std::min(fix.keyframe_id, attached->keyframe_id);
+    fix = *attached;
+    if (!fix.is_provisional) --provisional_fixes_;
     NoteFixesChanged(id);
   }
 }
 
-AttachedFix FixedLagSmoother::Attach(const Fix& fix, const OdometrySample& sample) const {
+std::optional<AttachedFix> FixedLagSmoother::Attach(const Fix& fix,
+                                                    const OdometrySample& sample) const {
   AttachedFix attached;
   attached.fix = fix;
   attached.keyframe_id = sample.keyframe_id;
-  attached.X_KF = sample.X_KB;
-  attached.covariance_KF = sample.covariance_KB;
-  attached.is_extrapolated = sample.is_extrapolated;
-  PrepareResidual(attached);
+  attached.X_KB = sample.X_KB;
+  attached.covariance_KB = sample.covariance_KB;
+  attached.is_provisional = sample.is_extrapolated;
+  if (window_.camera.IsSought()) {
+    const auto velocity = history_.VelocityAt(sample.time);
+    if (!velocity) return std::nullopt;
+    attached.is_provisional = history_.newest().time < sample.time + PoseHistory::kVelocityReach;
+    // A camera that looks to the left has the body turned about the camera, and a late time has it
+    // where it is no more.
+    if (fix.has_heading) attached.X_BF_by_camera.col(0) << fix.p_BC.y(), -fix.p_BC.x(), 1.0;
+    attached.X_BF_by_camera.col(1) = -*velocity;
+  }
+  PrepareResidual(attached, window_.camera.estimate);
   return attached;
 }
 
 void FixedLagSmoother::Insert(AttachedFix fix) {
-  if (fix.is_extrapolated) ++extrapolated_fixes_;
+  if (fix.is_provisional) ++provisional_fixes_;
   const std::int64_t id = fix.keyframe_id;
   window_.Insert(std::move(fix));
   NoteFixesChanged(id);
@@ -313,7 +334,7 @@ double FixedLagSmoother::SquaredInnovation(const AttachedFix& fix) const {
   const Pose2 X_WF = window_.X_WF(fix);
   const Pose2& X_WM = fix.fix.X_WB;
   const Eigen::Matrix3d predicted =
-      ComposeCovariance(newest_covariance_, fix.X_KF, fix.covariance_KF);
+      ComposeCovariance(newest_covariance_, fix.X_KF, fix.covariance_KB);
   const Eigen::Matrix2d R_WF = Eigen::Rotation2Dd(X_WF.yaw()).toRotationMatrix();
   const Eigen::Vector2d error_W = X_WM.translation() - X_WF.translation();
   if (!fix.fix.has_heading) {
@@ -343,16 +364,17 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
     ++(is_ahead ? counters_.fixes_ahead : counters_.fixes_late);
     return is_ahead ? FixOutcome::kAhead : FixOutcome::kLate;
   }
-  if (!window_.Has(sample->keyframe_id)) {
+  std::optional<AttachedFix> attached;
+  if (window_.Has(sample->keyframe_id)) attached = Attach(fix, *sample);
+  if (!attached) {
     ++counters_.fixes_late;
     return FixOutcome::kLate;
   }
-  const bool is_voter = Remember(fix, *sample);
-  AttachedFix attached = Attach(fix, *sample);
+  const bool is_voter = Remember(*attached);
   if (!is_started_) {
     if (!unstarted_fix_ || fix.time > unstarted_fix_->time) unstarted_fix_ = fix;
     if (window_.Get(sample->keyframe_id).fixes < config_.max_fixes_per_keyframe) {
-      Insert(std::move(attached));
+      Insert(*std::move(attached));
     }
     ++counters_.fixes_accepted;
     NoteSupport(*sample);
@@ -360,23 +382,23 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
     return FixOutcome::kAccepted;
   }
 
-  const double squared_innovation = SquaredInnovation(attached);
-  attached.is_gated = squared_innovation > config_.gate_squared_mahalanobis;
+  const double squared_innovation = SquaredInnovation(*attached);
+  attached->is_gated = squared_innovation > config_.gate_squared_mahalanobis;
   if (is_voter && squared_innovation <= kAgreement) ++agreements_since_start_;
   const Keyframe& keyframe = window_.Get(sample->keyframe_id);
-  const bool is_full =
-      (attached.is_gated ? keyframe.gated_fixes : keyframe.fixes) >= config_.max_fixes_per_keyframe;
-  const FixOutcome outcome = attached.is_gated ? FixOutcome::kGated
-                             : is_full         ? FixOutcome::kRedundant
-                                               : FixOutcome::kAccepted;
+  const bool is_full = (attached->is_gated ? keyframe.gated_fixes : keyframe.fixes) >=
+                       config_.max_fixes_per_keyframe;
+  const FixOutcome outcome = attached->is_gated ? FixOutcome::kGated
+                             : is_full          ? FixOutcome::kRedundant
+                                                : FixOutcome::kAccepted;
   if (outcome != FixOutcome::kGated) NoteSupport(*sample);
   if (outcome == FixOutcome::kAccepted) {
     ++counters_.fixes_accepted;
-    Insert(std::move(attached));
+    Insert(*std::move(attached));
     SolveWindow(config_.max_iterations);
   } else if (outcome == FixOutcome::kGated) {
     ++counters_.fixes_gated;
-    if (!is_full) Insert(std::move(attached));
+    if (!is_full) Insert(*std::move(attached));
   } else {
     ++counters_.fixes_redundant;
   }
@@ -391,7 +413,8 @@ void FixedLagSmoother::NoteSupport(const OdometrySample& sample) {
   }
 }
 
-bool FixedLagSmoother::Remember(const Fix& fix, const OdometrySample& sample) {
+bool FixedLagSmoother::Remember(const AttachedFix& attached) {
+  const Fix& fix = attached.fix;
   const auto after = std::upper_bound(
       voters_.begin(), voters_.end(), fix.time, [](MonotonicTime time, const Voter& voter) {
         return time < voter.time;
@@ -401,9 +424,9 @@ bool FixedLagSmoother::Remember(const Fix& fix, const OdometrySample& sample) {
   if (after != voters_.end() && after->time - fix.time < spacing) return false;
   Voter voter;
   voter.time = fix.time;
-  voter.keyframe_id = sample.keyframe_id;
-  voter.X_KF = sample.X_KB;
-  voter.fix = ToConsensusFix(fix, sample.X_OB);
+  voter.keyframe_id = attached.keyframe_id;
+  voter.X_KF = attached.X_KF;
+  voter.fix = ToConsensusFix(fix, X_OF(attached));
   voters_.insert(after, voter);
   if (voters_.size() > static_cast<std::size_t>(config_.relocalization_window)) {
     voters_.erase(voters_.begin());
@@ -538,7 +561,7 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
     drift_.Estimate(window_, newest_covariance_);
   }
   if (chain_.Solve(window_, weighting_, max_iterations)) {
-    newest_covariance_ = chain_.NewestCovariance(weighting_);
+    newest_covariance_ = chain_.NewestCovariance(window_, weighting_);
     if (IsCovariance(newest_covariance_)) return;
   }
   ++counters_.solver_failures;
@@ -553,8 +576,9 @@ void FixedLagSmoother::RestartAtNewest() {
   if (!IsCovariance(newest_covariance_)) newest_covariance_ = Eigen::Matrix3d::Identity();
   window_.keyframes.clear();
   window_.fixes.clear();
-  extrapolated_fixes_ = 0;
+  provisional_fixes_ = 0;
   window_.last_removed_fix.reset();
+  window_.camera = CameraOf(config_);
   chain_.Invalidate();
   newest.fixes = 0;
   newest.gated_fixes = 0;

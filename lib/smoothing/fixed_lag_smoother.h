@@ -50,12 +50,15 @@ bool IsCertain(const Eigen::Matrix3d& covariance, const SmootherConfig& config);
 /// How its fixes are weighted.
 FixWeighting WeightingOf(const SmootherConfig& config);
 
+/// What is believed of a camera before its first fix.
+CameraOffset CameraOf(const SmootherConfig& config);
+
 /// What became of a fix.
 enum class FixOutcome {
   kAccepted,
   kGated,      ///< Too far from the prediction; kept as a vote for a relocalisation.
   kRedundant,  ///< Agrees, but as one more of the same place it tells nothing.
-  kLate,       ///< Older than the odometry that is kept.
+  kLate,       ///< Older than the odometry that is kept and what is needed of it.
   kAhead,      ///< Too far ahead of the odometry, or there is none yet.
   kInvalid,    ///< Not finite, or no covariance.
 };
@@ -129,19 +132,22 @@ class FixedLagSmoother {
   [[nodiscard]] const SmootherConfig& config() const { return config_; }
   [[nodiscard]] const FixWeighting& weighting() const { return weighting_; }
   [[nodiscard]] const OdometryDrift& drift() const { return drift_; }
+  [[nodiscard]] const CameraOffset& camera() const { return window_.camera; }
 
  private:
   void Begin(MonotonicTime time);
   void AddKeyframe(OdometrySample& sample);
   void RemoveOldest();
-  void ReattachExtrapolated();
+  void ReattachProvisional();
 
-  [[nodiscard]] AttachedFix Attach(const Fix& fix, const OdometrySample& sample) const;
+  /// @return nothing where the camera's time is sought and the odometry knows no velocity.
+  [[nodiscard]] std::optional<AttachedFix> Attach(const Fix& fix,
+                                                  const OdometrySample& sample) const;
   void Insert(AttachedFix fix);
   void NoteFixesChanged(std::int64_t keyframe_id);
   [[nodiscard]] double SquaredInnovation(const AttachedFix& fix) const;
   /// @return whether it is one more voter: not right beside another in time.
-  bool Remember(const Fix& fix, const OdometrySample& sample);
+  bool Remember(const AttachedFix& attached);
   void NoteSupport(const OdometrySample& sample);
 
   void TryStart();
@@ -179,7 +185,7 @@ class FixedLagSmoother {
   FixMisfit misfit_;
   OdometryDrift drift_;
   int fixes_until_misfit_ = 0;
-  int extrapolated_fixes_ = 0;                                   ///< In the window.
+  int provisional_fixes_ = 0;                                    ///< In the window.
   Eigen::Matrix3d newest_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the newest keyframe.
   std::vector<Voter> voters_;                                    ///< By time, the newest last.
 

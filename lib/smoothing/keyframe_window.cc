@@ -5,6 +5,7 @@
 #include <utility>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "core/check.h"
 
@@ -13,10 +14,10 @@ namespace {
 
 /// The motion's covariance joins the fix's: it is small, and taken along the measured axes.
 Eigen::Matrix3d TotalCovariance(const AttachedFix& fix) {
-  if (fix.fix.has_heading) return fix.fix.covariance + fix.covariance_KF;
+  if (fix.fix.has_heading) return fix.fix.covariance + fix.covariance_KB;
   Eigen::Matrix3d total = fix.fix.covariance;
   total.topLeftCorner<2, 2>() +=
-      0.5 * fix.covariance_KF.topLeftCorner<2, 2>().trace() * Eigen::Matrix2d::Identity();
+      0.5 * fix.covariance_KB.topLeftCorner<2, 2>().trace() * Eigen::Matrix2d::Identity();
   return total;
 }
 
@@ -89,7 +90,20 @@ AttachedFix* UpdateSharesOfOne(AttachedFix* first,
 
 }  // namespace
 
-void PrepareResidual(AttachedFix& fix) {
+Pose2 AttachedFix::MotionWith(const Eigen::Vector2d& camera_offset) const {
+  const Eigen::Vector3d x_BF = X_BF_by_camera * camera_offset;
+  return X_KB * Pose2(x_BF.x(), x_BF.y(), x_BF.z());
+}
+
+ByCameraOffset AttachedFix::ErrorByCamera(double yaw_WK) const {
+  const Eigen::Rotation2Dd R_WB(yaw_WK + X_KB.yaw());
+  ByCameraOffset by_camera = X_BF_by_camera;
+  by_camera.topRows<2>() = R_WB * X_BF_by_camera.topRows<2>();
+  return by_camera;
+}
+
+void PrepareResidual(AttachedFix& fix, const Eigen::Vector2d& camera_offset) {
+  fix.X_KF = fix.MotionWith(camera_offset);
   const Eigen::Matrix3d covariance = TotalCovariance(fix);
   fix.covariance_root = CovarianceRoot(fix.fix);
   fix.residual = fix.fix.has_heading
@@ -142,6 +156,18 @@ AttachedFix& KeyframeWindow::Insert(AttachedFix fix) {
         return time < other.fix.time;
       });
   return *fixes.insert(after, std::move(fix));
+}
+
+void KeyframeWindow::SetCameraOffset(const Eigen::Vector2d& offset) {
+  const Eigen::Vector2d change = offset - camera.estimate;
+  camera.estimate = offset;
+  camera.before_window.rhs -= camera.before_window.information * change;
+  for (AttachedFix& fix : fixes)
+    PrepareResidual(fix, offset);
+  if (!prior) return;
+  const Eigen::Vector3d moved = prior->camera.by_camera * change;
+  const Pose2& X_WM = prior->pose.X_WB;
+  prior->pose.X_WB = Pose2(X_WM.x() + moved.x(), X_WM.y() + moved.y(), X_WM.yaw() + moved.z());
 }
 
 void KeyframeWindow::PopFront() {

@@ -42,23 +42,63 @@ struct Keyframe {
   [[nodiscard]] RelativePoseResidual MotionResidual() const { return {X_PK, covariance_PK}; }
 };
 
-/// A fix at the place F, and the motion to F from the keyframe before it.
+/// The derivative of a planar tangent by a camera's offset.
+using ByCameraOffset = Eigen::Matrix<double, 3, 2>;
+
+/// What keyframes say of a camera's offset: information * (offset - estimate) = rhs. Of the rhs, a
+/// bias of the fixes makes a part, given here for a bias of sigma one.
+struct CameraKnowledge {
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d bias_covariance = Eigen::Matrix2d::Zero();
+  Eigen::Matrix<double, 2, 3> bias_cross = Eigen::Matrix<double, 2, 3>::Zero();  ///< With the bias.
+};
+
+/// What a camera's offset does to an estimate, along W's axes, whose covariance is for a known one.
+struct CameraEffect {
+  ByCameraOffset by_camera = ByCameraOffset::Zero();
+  /// Covariance of what the fixes' bias makes of the knowledge's rhs and of the estimate.
+  Eigen::Matrix<double, 2, 3> bias_cross = Eigen::Matrix<double, 2, 3>::Zero();
+};
+
+/// What a camera gets wrong in all its fixes alike, as (yaw, time): it looks so many radians
+/// farther to the left than the config says, and its fixes' times are so many seconds late.
+///
+/// Two constants with Gaussian priors about zero. With several cameras it is what they have in
+/// common.
+struct CameraOffset {
+  Eigen::Vector2d prior_sigmas = Eigen::Vector2d::Zero();  ///< Of 0: it is not looked for.
+  Eigen::Vector2d estimate = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  CameraKnowledge before_window = {};  ///< From the keyframes that have left it.
+
+  [[nodiscard]] bool IsSought() const { return prior_sigmas.maxCoeff() > 0.0; }
+};
+
+/// A fix at the place F, and the motion to F from the keyframe before it: that of the body B at the
+/// fix's time, and what the camera's offset makes of it.
 struct AttachedFix {
   Fix fix;
   std::int64_t keyframe_id = 0;
-  Pose2 X_KF;
-  Eigen::Matrix3d covariance_KF = Eigen::Matrix3d::Zero();
-  bool is_extrapolated =
-      false;              ///< X_KF is a prediction, to be replaced when the odometry is there.
-  bool is_gated = false;  ///< Kept, but without influence.
-  double share = 0.0;     ///< Of it that is news, by UpdateShares.
+  Pose2 X_KB;
+  Eigen::Matrix3d covariance_KB = Eigen::Matrix3d::Zero();
+  ByCameraOffset X_BF_by_camera = ByCameraOffset::Zero();  ///< X_BF = Pose2(this * offset).
+  Pose2 X_KF;                                              ///< With the present estimate.
+  bool is_provisional = false;  ///< To be attached anew when the odometry has gone on.
+  bool is_gated = false;        ///< Kept, but without influence.
+  double share = 0.0;           ///< Of it that is news, by UpdateShares.
   /// The lower triangular root of its own covariance along W's axes: what a bias of one is in it.
   Eigen::Matrix3d covariance_root = Eigen::Matrix3d::Zero();
   AbsolutePoseResidual residual;
+
+  /// X_KF with another camera offset.
+  [[nodiscard]] Pose2 MotionWith(const Eigen::Vector2d& camera_offset) const;
+  /// The derivative of the residual's error by the camera's offset, where K looks to `yaw_WK`.
+  [[nodiscard]] ByCameraOffset ErrorByCamera(double yaw_WK) const;
 };
 
-/// Fills in `residual` and `covariance_root` from the other members.
-void PrepareResidual(AttachedFix& fix);
+/// Fills in `X_KF`, `residual` and `covariance_root` from the other members.
+void PrepareResidual(AttachedFix& fix, const Eigen::Vector2d& camera_offset = {0.0, 0.0});
 
 /// Neighbouring fixes err together by a slowly varying bias: a Gauss-Markov process along W's axes.
 struct FixBias {
@@ -120,6 +160,7 @@ class FixWeighting {
 struct KeyframePrior {
   PlanarPose pose;
   FixBiasEffect bias = {};  ///< Along W's axes, not part of the pose's covariance.
+  CameraEffect camera = {};
 };
 
 /// A chain of keyframes with fixes on them, and what is known of its oldest from those before.
@@ -127,6 +168,7 @@ struct KeyframeWindow {
   SlidingVector<Keyframe> keyframes;
   SlidingVector<AttachedFix> fixes;               ///< By time.
   std::optional<KeyframePrior> prior;             ///< Of the oldest keyframe.
+  CameraOffset camera;                            ///< Of all fixes.
   std::optional<MonotonicTime> last_removed_fix;  ///< The next one may be correlated with it.
 
   [[nodiscard]] bool Has(std::int64_t keyframe_id) const;
@@ -138,6 +180,8 @@ struct KeyframeWindow {
 
   /// Puts a fix in its place by time, and counts it with its keyframe.
   AttachedFix& Insert(AttachedFix fix);
+  /// Moves the estimate of the camera's offset, the fixes and the prior with it.
+  void SetCameraOffset(const Eigen::Vector2d& offset);
   /// Takes the oldest keyframe and its fixes out. The window must have two keyframes.
   void PopFront();
 };

@@ -59,6 +59,8 @@ KeyframeWindow CollectKeyframes(const MotionLog& log, const SmootherConfig& conf
     collect(keyframe);
   const auto& fixes = smoother.window().fixes;
   std::copy(fixes.begin(), fixes.end(), std::back_inserter(all.fixes));
+  all.camera = CameraOf(config);
+  all.SetCameraOffset(smoother.camera().estimate);
   return all;
 }
 
@@ -217,7 +219,9 @@ Fix MakePoseFix(MonotonicTime time, const Pose2& X_WB, const SmootherConfig& con
   return fix;
 }
 
-std::vector<SmootherEstimate> SmoothCausally(const MotionLog& log, const SmootherConfig& config) {
+std::vector<SmootherEstimate> SmoothCausally(const MotionLog& log,
+                                             const SmootherConfig& config,
+                                             CameraOffset* camera) {
   FixedLagSmoother smoother(config);
   std::vector<SmootherEstimate> estimates;
   estimates.reserve(log.fixes.size());
@@ -226,10 +230,14 @@ std::vector<SmootherEstimate> SmoothCausally(const MotionLog& log, const Smoothe
     none.time = fix.time;
     estimates.push_back(smoother.EstimateAt(fix.time).value_or(none));
   });
+  if (camera != nullptr) *camera = smoother.camera();
   return estimates;
 }
 
-std::vector<SmootherEstimate> SmoothAll(const MotionLog& log, const SmootherConfig& config) {
+std::vector<SmootherEstimate> SmoothAll(const MotionLog& log,
+                                        const SmootherConfig& config,
+                                        CameraOffset* camera) {
+  if (camera != nullptr) *camera = CameraOf(config);
   std::vector<SmootherEstimate> estimates(log.fixes.size());
   for (std::size_t i = 0; i < estimates.size(); ++i)
     estimates[i].time = log.fixes[i].time;
@@ -252,6 +260,7 @@ std::vector<SmootherEstimate> SmoothAll(const MotionLog& log, const SmootherConf
   SolveBatch(all, weighting, kBatchIterations);
   const std::vector<Eigen::Matrix3d> covariances =
       ChainSolver(all.keyframes.size()).SmoothedCovariances(all, weighting);
+  if (camera != nullptr) *camera = all.camera;
   const OdometryLookup odometry(log, all, config);
   for (SmootherEstimate& estimate : estimates) {
     const auto sample = odometry.At(estimate.time);

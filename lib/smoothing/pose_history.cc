@@ -46,6 +46,20 @@ std::optional<OdometrySample> PoseHistory::At(MonotonicTime time) const {
   return sample;
 }
 
+std::optional<Eigen::Vector3d> PoseHistory::VelocityAt(MonotonicTime time) const {
+  constexpr double kFewestSeconds = 0.1;
+  constexpr double kFastest = 200.0;
+  if (samples_.empty()) return std::nullopt;
+  const MonotonicTime middle = std::min(time, samples_.back().time);
+  const MonotonicTime begin = std::max(middle - kVelocityReach, samples_.front().time);
+  const MonotonicTime end = std::min(middle + kVelocityReach, samples_.back().time);
+  const double seconds = ToSeconds(end - begin);
+  if (seconds < kFewestSeconds) return std::nullopt;
+  const Eigen::Vector3d velocity = (At(begin)->X_OB.Inverse() * At(end)->X_OB).Log() / seconds;
+  if (!(velocity.norm() < kFastest)) return std::nullopt;
+  return velocity;
+}
+
 std::optional<OdometrySample> PoseHistory::Extrapolate(MonotonicTime time) const {
   const OdometrySample& last = samples_.back();
   const Duration ahead = time - last.time;

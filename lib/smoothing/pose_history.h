@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -42,6 +43,16 @@ class PoseHistory {
   ///
   /// @return nothing before the oldest sample, or too far after the newest.
   [[nodiscard]] std::optional<OdometrySample> At(MonotonicTime time) const;
+
+  /// Velocities are means over so much before a time, and as much after it.
+  static constexpr Duration kVelocityReach = std::chrono::milliseconds(500);
+
+  /// The velocity (x, y, yaw) along the body's axes, in m/s and rad/s; after the newest sample, and
+  /// nearly there, what is known of it then.
+  ///
+  /// @return nothing too near to the oldest sample, or beyond any vehicle's: there the odometry
+  /// jumped.
+  [[nodiscard]] std::optional<Eigen::Vector3d> VelocityAt(MonotonicTime time) const;
 
   [[nodiscard]] bool empty() const { return samples_.empty(); }
   [[nodiscard]] const OdometrySample& newest() const { return samples_.back(); }

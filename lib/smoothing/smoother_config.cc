@@ -75,6 +75,8 @@ Result<void> SmootherConfig::Validate() const {
       {"fix_correlation_time_s", fix_correlation_time_s, 0.0, true},
       {"fix_bias_sigmas", fix_bias_sigmas, 0.0, true},
       {"fix_bias_time_s", fix_bias_time_s, 0.0, false},
+      {"camera_yaw_sigma_rad", camera_yaw_sigma_rad, 0.0, true, 0.5},
+      {"camera_time_sigma_s", camera_time_sigma_s, 0.0, true, 1.0},
       {"max_fixes_per_keyframe", static_cast<double>(max_fixes_per_keyframe), 1.0, true, 1000.0},
       {"max_fix_age_s", max_fix_age_s, 0.0, false},
       {"max_extrapolation_s", max_extrapolation_s, 0.0, true},

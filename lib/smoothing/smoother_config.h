@@ -53,6 +53,8 @@ struct SmootherConfig {
   double fix_correlation_time_s = 0.2;
   double fix_bias_sigmas = 0.5;
   double fix_bias_time_s = 10.0;
+  double camera_yaw_sigma_rad = 0.0;
+  double camera_time_sigma_s = 0.0;
   int max_fixes_per_keyframe = 8;
   double max_fix_age_s = 10.0;
   double max_extrapolation_s = 0.5;
@@ -132,6 +134,14 @@ struct SmootherConfig {
           ">= 0; of a slowly varying part of the fixes' errors, as a part of them as they are "
           "measured: the reported covariance allows for it");
     visit("fix_bias_time_s", self.fix_bias_time_s, "> 0; after which 1/e of it is left");
+    visit("camera_yaw_sigma_rad",
+          self.camera_yaw_sigma_rad,
+          "[0, 0.5]; by how much the camera may look to the left of where the config has it, which "
+          "is "
+          "estimated from fixes with a heading; 0: it is not");
+    visit("camera_time_sigma_s",
+          self.camera_time_sigma_s,
+          "[0, 1]; by how much the fixes' times may be late, likewise");
     visit("max_fixes_per_keyframe",
           self.max_fixes_per_keyframe,
           "[1, 1000]; further ones of the same place are not used: they add no information");

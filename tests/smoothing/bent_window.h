@@ -26,8 +26,8 @@ inline AttachedFix MakeAttachedFix(const Keyframe& keyframe, const Pose2& error,
   fix.fix.time = keyframe.time;
   fix.fix.has_heading = has_heading;
   fix.fix.covariance = Eigen::Vector3d(0.09, 0.04, 0.01).asDiagonal();
-  fix.X_KF = Pose2(0.2, 0.0, 0.01);
-  fix.fix.X_WB = keyframe.X_WK() * fix.X_KF * error;
+  fix.X_KB = Pose2(0.2, 0.0, 0.01);
+  fix.fix.X_WB = keyframe.X_WK() * fix.X_KB * error;
   PrepareResidual(fix);
   return fix;
 }

@@ -141,13 +141,16 @@ const FixWeighting kBiased(1e6, 0.0, {.sigmas = 0.5, .time_s = 4.0});
 /// The normal equations of a window, set up as a whole: the information, and by how much a bias of
 /// each keyframe's fixes moves the right-hand side.
 struct DenseEquations {
-  Eigen::MatrixXd information;
+  Eigen::MatrixXd information;  ///< The camera's offset is last.
   Eigen::MatrixXd rhs_by_bias;
 };
 
 DenseEquations SetUpDense(KeyframeWindow& window) {
   const auto size = static_cast<Eigen::Index>(3 * window.keyframes.size());
-  DenseEquations dense{Eigen::MatrixXd::Zero(size, size), Eigen::MatrixXd::Zero(size, size)};
+  DenseEquations dense{Eigen::MatrixXd::Zero(size + 2, size + 2),
+                       Eigen::MatrixXd::Zero(size + 2, size)};
+  const Eigen::Vector2d camera_sigmas = window.camera.prior_sigmas.cwiseMax(1e-9);
+  dense.information.bottomRightCorner<2, 2>().diagonal() = camera_sigmas.cwiseAbs2().cwiseInverse();
   const auto prior =
       AbsolutePoseResidual::OfPose(window.prior->pose.X_WB, Pose2(), window.prior->pose.covariance);
   dense.information.topLeftCorner<3, 3>() += prior.information();
@@ -161,12 +164,15 @@ DenseEquations SetUpDense(KeyframeWindow& window) {
         jacobian.transpose() * residual.covariance().inverse() * jacobian;
   }
   for (const AttachedFix& fix : window.fixes) {
-    const Eigen::Matrix3d jacobian = fix.residual.Linearize(window.Get(fix.keyframe_id).x_WK).by_K;
-    const Eigen::Matrix3d gradient =
-        kQuadratic.BaseWeight(fix) * jacobian.transpose() * fix.residual.information();
+    const Eigen::Vector3d& x_WK = window.Get(fix.keyframe_id).x_WK;
     const auto i = static_cast<Eigen::Index>(3 * fix.keyframe_id);
-    dense.information.block<3, 3>(i, i) += gradient * jacobian;
-    dense.rhs_by_bias.block<3, 3>(i, i) += gradient * fix.covariance_root;
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(3, size + 2);
+    jacobian.middleCols<3>(i) = fix.residual.Linearize(x_WK).by_K;
+    jacobian.rightCols<2>() = fix.ErrorByCamera(x_WK.z());
+    const Eigen::MatrixXd gradient =
+        kQuadratic.BaseWeight(fix) * jacobian.transpose() * fix.residual.information();
+    dense.information += gradient * jacobian;
+    dense.rhs_by_bias.middleCols<3>(i) += gradient * fix.covariance_root;
   }
   return dense;
 }
@@ -186,22 +192,27 @@ Eigen::MatrixXd BiasCovariance(const KeyframeWindow& window, const FixWeighting&
   return covariance;
 }
 
-/// The covariances of right perturbations, from the whole window's equations.
-std::vector<Eigen::Matrix3d> DenseCovariances(KeyframeWindow& window,
-                                              const FixWeighting& weighting) {
+/// The covariances of right perturbations, and of the camera's offset, from the whole window's
+/// equations.
+struct DenseResult {
+  std::vector<Eigen::Matrix3d> covariances;
+  Eigen::Matrix2d of_camera;
+};
+
+DenseResult SolveDense(KeyframeWindow& window, const FixWeighting& weighting) {
   const DenseEquations dense = SetUpDense(window);
   const Eigen::MatrixXd inverse = dense.information.inverse();
   const Eigen::MatrixXd by_bias = inverse * dense.rhs_by_bias;
   const Eigen::MatrixXd all =
       inverse + by_bias * BiasCovariance(window, weighting) * by_bias.transpose();
-  std::vector<Eigen::Matrix3d> covariances;
+  DenseResult result{.covariances = {}, .of_camera = all.bottomRightCorner<2, 2>()};
   for (const Keyframe& keyframe : window.keyframes) {
     Eigen::Matrix3d R_KW = Eigen::Matrix3d::Identity();
     R_KW.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(-keyframe.x_WK.z()).toRotationMatrix();
     const auto i = static_cast<Eigen::Index>(3 * keyframe.id);
-    covariances.emplace_back(R_KW * all.block<3, 3>(i, i) * R_KW.transpose());
+    result.covariances.emplace_back(R_KW * all.block<3, 3>(i, i) * R_KW.transpose());
   }
-  return covariances;
+  return result;
 }
 
 TEST(ChainSolverTest, CovariancesAreThoseOfTheWholeNormalEquations) {
@@ -209,14 +220,91 @@ TEST(ChainSolverTest, CovariancesAreThoseOfTheWholeNormalEquations) {
     KeyframeWindow window = MakeBentWindow(20, 1);
     ChainSolver chain(20);
     ASSERT_TRUE(chain.Solve(window, weighting, 50));
-    const std::vector<Eigen::Matrix3d> expected = DenseCovariances(window, weighting);
+    const std::vector<Eigen::Matrix3d> expected = SolveDense(window, weighting).covariances;
     // The equations are set up where the last step began, or a keyframe turned by a milliradian.
     const double tolerance = 5e-3 * expected.back().diagonal().maxCoeff();
-    EXPECT_THAT(chain.NewestCovariance(weighting), IsNear(expected.back(), tolerance));
+    EXPECT_THAT(chain.NewestCovariance(window, weighting), IsNear(expected.back(), tolerance));
     const std::vector<Eigen::Matrix3d> smoothed = chain.SmoothedCovariances(window, weighting);
     for (std::size_t i = 0; i < expected.size(); ++i)
       EXPECT_THAT(smoothed[i], IsNear(expected[i], tolerance)) << "keyframe " << i;
   }
+}
+
+/// The bent window's fixes are turned and late: a camera with an offset.
+KeyframeWindow MakeWindowOfOffsetCamera(int keyframes, unsigned seed) {
+  KeyframeWindow window = MakeBentWindow(keyframes, seed);
+  window.camera.prior_sigmas = {0.2, 0.5};
+  for (AttachedFix& fix : window.fixes) {
+    const double speed = 1.0 + 0.1 * static_cast<double>(fix.keyframe_id % 7);
+    fix.X_BF_by_camera.col(1) << -speed, 0.0, -0.2;
+    if (fix.fix.has_heading) fix.X_BF_by_camera.col(0) << 0.3, -1.0, 1.0;
+    fix.fix.X_WB = fix.fix.X_WB * Pose2(-0.25 * speed, 0.0, 0.1);
+    PrepareResidual(fix);
+  }
+  return window;
+}
+
+void SolveToTheEnd(KeyframeWindow& window, const FixWeighting& weighting, ChainSolver& chain) {
+  for (int i = 0; i < 20; ++i) {
+    chain.Invalidate();
+    ASSERT_TRUE(chain.Solve(window, weighting, 10));
+  }
+}
+
+TEST(ChainSolverTest, FindsTheCameraOffsetThatCeresFinds) {
+  for (const FixWeighting& weighting : {kQuadratic, kRobust}) {
+    KeyframeWindow window = MakeWindowOfOffsetCamera(60, 7);
+    KeyframeWindow optimum = window;
+    ChainSolver chain(60);
+    SolveToTheEnd(window, weighting, chain);
+    ASSERT_TRUE(SolveBatch(optimum, weighting, 200));
+    // It is left where it is within a tenth of its sigma.
+    const Eigen::Vector2d sigmas = window.camera.covariance.diagonal().cwiseSqrt();
+    EXPECT_GT(optimum.camera.estimate.y(), 0.1);
+    EXPECT_LT(sigmas.x(), 0.1);
+    for (int i = 0; i < 2; ++i)
+      EXPECT_NEAR(window.camera.estimate[i], optimum.camera.estimate[i], 0.11 * sigmas[i]) << i;
+    EXPECT_LT(LargestDifference(window, optimum), 0.03);
+  }
+}
+
+TEST(ChainSolverTest, TheCameraOffsetsCovarianceIsThatOfTheWholeNormalEquations) {
+  for (const FixWeighting& weighting : {kQuadratic, kBiased}) {
+    KeyframeWindow window = MakeWindowOfOffsetCamera(20, 1);
+    ChainSolver chain(20);
+    SolveToTheEnd(window, weighting, chain);
+    const DenseResult expected = SolveDense(window, weighting);
+    EXPECT_THAT(window.camera.covariance,
+                IsNear(expected.of_camera, 5e-3 * expected.of_camera.diagonal().maxCoeff()));
+    const double tolerance = 5e-3 * expected.covariances.back().diagonal().maxCoeff();
+    EXPECT_THAT(chain.NewestCovariance(window, weighting),
+                IsNear(expected.covariances.back(), tolerance));
+    if (weighting.BiasVariance() > 0.0) continue;
+    const std::vector<Eigen::Matrix3d> smoothed = chain.SmoothedCovariances(window, weighting);
+    for (std::size_t i = 0; i < smoothed.size(); ++i)
+      EXPECT_THAT(smoothed[i], IsNear(expected.covariances[i], tolerance)) << "keyframe " << i;
+  }
+}
+
+/// But for the little that is forgotten with each keyframe.
+TEST(ChainSolverTest, MarginalizingKeepsWhatIsKnownOfTheCamera) {
+  KeyframeWindow whole = MakeWindowOfOffsetCamera(30, 2);
+  KeyframeWindow shortened = MakeWindowOfOffsetCamera(30, 2);
+  ChainSolver chain(30);
+  ChainSolver other(30);
+  SolveToTheEnd(whole, kBiased, chain);
+  SolveToTheEnd(shortened, kBiased, other);
+  for (int i = 0; i < 20; ++i)
+    other.MarginalizeOldest(shortened, kBiased);
+  SolveToTheEnd(shortened, kBiased, other);
+  const Eigen::Vector2d sigmas = whole.camera.covariance.diagonal().cwiseSqrt();
+  const Eigen::Vector2d after = shortened.camera.covariance.diagonal().cwiseSqrt();
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_NEAR(after[i], sigmas[i], 0.01 * sigmas[i]) << i;
+    EXPECT_NEAR(shortened.camera.estimate[i], whole.camera.estimate[i], 0.05 * sigmas[i]) << i;
+  }
+  EXPECT_THAT(other.NewestCovariance(shortened, kBiased),
+              IsNear(chain.NewestCovariance(whole, kBiased), 2e-4));
 }
 
 TEST(ChainSolverTest, MarginalizingChangesNeitherEstimateNorCovariance) {
@@ -233,7 +321,8 @@ TEST(ChainSolverTest, MarginalizingChangesNeitherEstimateNorCovariance) {
   other.Invalidate();
   ASSERT_TRUE(other.Solve(shortened, kBiased, 50));
   EXPECT_LT(LargestDifference(shortened, whole), 1e-4);
-  EXPECT_THAT(other.NewestCovariance(kBiased), IsNear(chain.NewestCovariance(kBiased), 5e-5));
+  EXPECT_THAT(other.NewestCovariance(shortened, kBiased),
+              IsNear(chain.NewestCovariance(whole, kBiased), 5e-5));
 }
 
 /// A stiff chain that is held by weak fixes alone: what a rigid shift costs is small beside what

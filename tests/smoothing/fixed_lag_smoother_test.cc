@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -455,6 +456,113 @@ TEST(SmoothAllTest, PutsTheOdometryRightFromTheBeginning) {
   EXPECT_LT(Summarize(errors).rmse, 0.35);
 }
 
+/// A car whose wheels err by one percent of the root of a metre, and a camera that is turned and
+/// late.
+DriveOptions DriveWithOffsetCamera(double turn_rad_per_m) {
+  return {.duration_s = 200.0,
+          .fix_rate_hz = 5.0,
+          .speed_mps = 6.0,
+          .outlier_share = 0.1,
+          .camera_yaw_rad = 0.0175,
+          .camera_time_s = 0.08,
+          .turn_rad_per_m = turn_rad_per_m,
+          .noise = {.forward_sigma_m_per_sqrt_m = 0.01}};
+}
+
+SmootherConfig ConfigOfOffsetCamera() {
+  SmootherConfig config;
+  config.camera_yaw_sigma_rad = 0.05;
+  config.camera_time_sigma_s = 0.1;
+  return config;
+}
+
+TEST(FixedLagSmootherTest, LearnsHowTheCameraIsTurnedAndHowLateItIs) {
+  std::vector<double> learning;
+  std::vector<double> not_learning;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), seed).Run();
+    FixedLagSmoother smoother(ConfigOfOffsetCamera());
+    learning.push_back(PositionError(Drive(drive, smoother).X_WB, drive.X_WB_end));
+    const CameraOffset& camera = smoother.camera();
+    const Eigen::Vector2d sigmas = camera.covariance.diagonal().cwiseSqrt();
+    EXPECT_LT(sigmas.x(), 0.006);
+    EXPECT_LT(sigmas.y(), 0.03);
+    EXPECT_NEAR(camera.estimate.x(), 0.0175, 3.0 * sigmas.x()) << seed;
+    EXPECT_NEAR(camera.estimate.y(), 0.08, 3.0 * sigmas.y()) << seed;
+    FixedLagSmoother other{SmootherConfig()};
+    not_learning.push_back(PositionError(Drive(drive, other).X_WB, drive.X_WB_end));
+    EXPECT_EQ(other.camera().estimate, Eigen::Vector2d::Zero());
+  }
+  std::cout << "position: rmse " << Summarize(learning).rmse << " m, not learning "
+            << Summarize(not_learning).rmse << " m\n";
+  EXPECT_LT(Summarize(learning).rmse, 0.7 * Summarize(not_learning).rmse);
+}
+
+/// Straight on at one speed the fixes of a late camera are those of a body farther back.
+TEST(FixedLagSmootherTest, KnowsThatAStraightRoadDoesNotTellHowLateTheCameraIs) {
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    const auto drive = DriveSimulator(DriveWithOffsetCamera(0.0), seed).Run();
+    FixedLagSmoother smoother(ConfigOfOffsetCamera());
+    const SmootherEstimate estimate = Drive(drive, smoother);
+    const double sigma_s = std::sqrt(smoother.camera().covariance(1, 1));
+    EXPECT_GT(sigma_s, 0.08) << seed;
+    EXPECT_NEAR(smoother.camera().estimate.y(), 0.08, 3.0 * sigma_s) << seed;
+    // What that may be on the road is part of the covariance.
+    EXPECT_GT(std::sqrt(estimate.covariance(0, 0)), 0.9 * 6.0 * sigma_s) << seed;
+  }
+}
+
+TEST(FixedLagSmootherTest, PositionsDoNotTellHowTheCameraIsTurned) {
+  DriveOptions options = DriveWithOffsetCamera(0.15);
+  options.has_heading = false;
+  const auto drive = DriveSimulator(options, 1).Run();
+  FixedLagSmoother smoother(ConfigOfOffsetCamera());
+  Drive(drive, smoother);
+  EXPECT_NEAR(smoother.camera().estimate.x(), 0.0, 1e-9);
+  EXPECT_NEAR(smoother.camera().covariance(0, 0), 0.05 * 0.05, 1e-9);
+}
+
+/// A camera at the front that looks to the left has the body turned about the camera: its middle to
+/// the right of where it is.
+TEST(FixedLagSmootherTest, ATurnedCameraMovesTheBodyAboutTheCamera) {
+  auto drive = DriveSimulator({.fix_rate_hz = 5.0}, 3).Run();
+  const double turn = 0.05;
+  const Eigen::Vector2d p_BC(2.0, 0.0);
+  for (Fix& fix : drive.log.fixes) {
+    const Eigen::Vector2d p_turned = Eigen::Rotation2Dd(turn) * p_BC;
+    const Eigen::Vector2d moved = p_BC - p_turned;
+    fix.X_WB = fix.X_WB * Pose2(moved.x(), moved.y(), turn);
+    fix.p_BC = p_BC;
+  }
+  SmootherConfig config;
+  config.camera_yaw_sigma_rad = 0.05;
+  FixedLagSmoother smoother(config);
+  const SmootherEstimate estimate = Drive(drive, smoother);
+  const double sigma = std::sqrt(smoother.camera().covariance(0, 0));
+  EXPECT_LT(sigma, 0.01);
+  EXPECT_NEAR(smoother.camera().estimate.x(), turn, 3.0 * sigma);
+  EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.3);
+}
+
+TEST(FixedLagSmootherTest, AJumpOfTheOdometryDoesNotSpoilWhatIsKnownOfTheCamera) {
+  const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), 1).Run();
+  FixedLagSmoother smoother(ConfigOfOffsetCamera());
+  Drive(drive, smoother);
+  const double before = smoother.camera().estimate.y();
+  OdometryStep jump = drive.log.odometry.back();
+  Fix fix = drive.log.fixes.back();
+  for (const double length : {1e3, 1e7, 1e150}) {
+    jump.time += milliseconds(50);
+    jump.X_BprevB = Pose2(length, 0.0, 0.0);
+    EXPECT_EQ(smoother.AddOdometry(jump).has_value(), length < 1e8);
+    fix.time = jump.time;
+    smoother.AddFix(fix);
+    EXPECT_TRUE(smoother.camera().covariance.allFinite());
+    EXPECT_TRUE(smoother.Estimate().X_WB.translation().allFinite());
+  }
+  EXPECT_NEAR(smoother.camera().estimate.y(), before, 0.02);
+}
+
 TEST(FixedLagSmootherTest, SaysHowFarItKnowsItsPose) {
   const auto drive = DriveSimulator({}, 12).Run();
   FixedLagSmoother smoother{SmootherConfig()};
@@ -514,6 +622,20 @@ TEST(FixedLagSmootherTest, AResetIsAboutThisMoment) {
   OdometryStep step = drive.log.odometry.back();
   step.time += milliseconds(50);
   EXPECT_TRUE(smoother.AddOdometry(step));
+}
+
+TEST(SmoothAllTest, FindsTheCamerasOffset) {
+  const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), 2).Run();
+  CameraOffset causal;
+  CameraOffset smoothed;
+  SmoothCausally(drive.log, ConfigOfOffsetCamera(), &causal);
+  SmoothAll(drive.log, ConfigOfOffsetCamera(), &smoothed);
+  const Eigen::Vector2d sigmas = smoothed.covariance.diagonal().cwiseSqrt();
+  EXPECT_LT(sigmas.x(), 0.006);
+  EXPECT_LT(sigmas.y(), 0.03);
+  EXPECT_NEAR(smoothed.estimate.x(), 0.0175, 3.0 * sigmas.x());
+  EXPECT_NEAR(smoothed.estimate.y(), 0.08, 3.0 * sigmas.y());
+  EXPECT_NEAR(causal.estimate.y(), smoothed.estimate.y(), 2.0 * sigmas.y());
 }
 
 TEST(SmoothAllTest, BeatsTheCausalEstimate) {

@@ -62,5 +62,28 @@ TEST(PoseHistoryTest, KnowsNothingBeforeItsFirstSample) {
   EXPECT_FALSE(StraightDrive(2).At(MonotonicTime(seconds(-1))));
 }
 
+TEST(PoseHistoryTest, KnowsTheVelocityAlongTheBodysAxes) {
+  PoseHistory history(seconds(10), milliseconds(500));
+  EXPECT_FALSE(history.VelocityAt(MonotonicTime(seconds(1))));
+  OdometrySample sample;
+  sample.time = MonotonicTime(seconds(1));
+  history.Push(sample);
+  EXPECT_FALSE(history.VelocityAt(sample.time));
+  for (int i = 0; i < 20; ++i) {
+    sample.time += milliseconds(100);
+    sample.X_OB = sample.X_OB * Pose2::Exp({0.2, 0.0, 0.05});
+    history.Push(sample);
+  }
+  for (const int ms : {1000, 2000, 2950, 3300}) {
+    const auto velocity = history.VelocityAt(MonotonicTime(milliseconds(ms)));
+    ASSERT_TRUE(velocity) << ms;
+    EXPECT_LT((*velocity - Eigen::Vector3d(2.0, 0.0, 0.5)).norm(), 1e-9) << ms;
+  }
+  sample.time += milliseconds(100);
+  sample.X_OB = Pose2(1e6, 0.0, 0.0);
+  history.Push(sample);
+  EXPECT_FALSE(history.VelocityAt(sample.time));
+}
+
 }  // namespace
 }  // namespace relocd

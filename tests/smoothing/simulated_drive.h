@@ -25,6 +25,10 @@ struct DriveOptions {
   bool has_heading = true;
   double bias_sigmas = 0.0;  ///< Of a part of the fixes' errors that lasts, in their sigmas.
   double bias_time_s = 10.0;
+  double camera_yaw_rad = 0.0;   ///< By which the fixes are turned to the left.
+  double camera_time_s = 0.0;    ///< By which their times are late.
+  double turn_rad_per_m = 0.15;  ///< At most, to both sides.
+  OdometryNoiseConfig noise = {};
   Pose2 X_WB0{10.0, -20.0, 0.5};
 };
 
@@ -52,10 +56,10 @@ class DriveSimulator {
     for (int i = 0; i < steps; ++i, time += period) {
       const double t = ToSeconds(period) * i;
       const double travel = i == 0 ? 0.0 : options_.speed_mps * ToSeconds(period);
-      const double turn = 0.15 * std::sin(0.07 * t) * travel;
+      const double turn = options_.turn_rad_per_m * std::sin(0.07 * t) * travel;
       const Pose2 motion = Pose2::Exp({travel, 0.0, turn});
       X_WB = X_WB * motion;
-      OdometryStep step = MakeOdometryStep(time, period, motion, {});
+      OdometryStep step = MakeOdometryStep(time, period, motion, options_.noise);
       step.X_BprevB = motion * Pose2::Exp(Draw(step.covariance));
       drive.log.odometry.push_back(step);
       if (i % steps_per_fix != 0) continue;
@@ -73,12 +77,13 @@ class DriveSimulator {
 
   Fix MakeFix(MonotonicTime time, const Pose2& X_WB) {
     Fix fix;
-    fix.time = time;
+    fix.time = time + FromSeconds(options_.camera_time_s);
     fix.has_heading = options_.has_heading;
     const Eigen::Vector3d sigmas(
         options_.fix_sigma_m, options_.fix_sigma_m, options_.fix_heading_sigma_rad);
     fix.covariance = sigmas.cwiseAbs2().asDiagonal();
-    const Pose2 X_WM = X_WB * Pose2::Exp(Draw(fix.covariance));
+    const Pose2 X_WM =
+        X_WB * Pose2(0.0, 0.0, options_.camera_yaw_rad) * Pose2::Exp(Draw(fix.covariance));
     const Eigen::Vector3d bias = NextBias().cwiseProduct(sigmas);
     fix.X_WB = Pose2(X_WM.x() + bias.x(), X_WM.y() + bias.y(), X_WM.yaw() + bias.z());
     if (uniform_(engine_) < options_.outlier_share) {

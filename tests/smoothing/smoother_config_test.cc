@@ -44,7 +44,7 @@ TEST(SmootherConfigTest, VisitsEveryField) {
     EXPECT_STRNE(comment, "");
     ++fields;
   });
-  EXPECT_EQ(fields, 30);
+  EXPECT_EQ(fields, 32);
 }
 
 }  // namespace

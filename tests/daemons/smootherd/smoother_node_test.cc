@@ -498,6 +498,19 @@ TEST_F(SmootherNodeTest, AClockThatJumpsBackByHoursIsFollowed) {
   EXPECT_EQ(localizations_.back().status, localization_t::OK);
 }
 
+TEST_F(SmootherNodeTest, SaysWhatItKnowsOfTheCameraWhereThatIsSought) {
+  const auto says_so = [](const SmootherNode& node) {
+    const NodeStatus status = node.Status({});
+    return std::any_of(status.values.begin(), status.values.end(), [](const auto& v) {
+      return v.name == "camera_time_sigma_s" && v.value == 0.1;
+    });
+  };
+  EXPECT_FALSE(says_so(*node_));
+  LocalizationConfig config;
+  config.smoother.camera_time_sigma_s = 0.1;
+  EXPECT_TRUE(says_so(SmootherNode(config, {}, bus_, 1)));
+}
+
 TEST_F(SmootherNodeTest, SaysHowLongItTook) {
   for (int i = 1; i <= 100; ++i)
     node_->NotePoseLatency(std::chrono::microseconds(10 * i));
