@@ -527,7 +527,7 @@ TEST(FixedLagSmootherTest, PositionsDoNotTellHowTheCameraIsTurned) {
 TEST(FixedLagSmootherTest, ATurnedCameraMovesTheBodyAboutTheCamera) {
   auto drive = DriveSimulator({.fix_rate_hz = 5.0}, 3).Run();
   const double turn = 0.05;
-  const Eigen::Vector2d p_BC(2.0, 0.0);
+  const Eigen::Vector2d p_BC(10.0, 0.0);
   for (Fix& fix : drive.log.fixes) {
     const Eigen::Vector2d p_turned = Eigen::Rotation2Dd(turn) * p_BC;
     const Eigen::Vector2d moved = p_BC - p_turned;
@@ -542,6 +542,16 @@ TEST(FixedLagSmootherTest, ATurnedCameraMovesTheBodyAboutTheCamera) {
   EXPECT_LT(sigma, 0.01);
   EXPECT_NEAR(smoother.camera().estimate.x(), turn, 3.0 * sigma);
   EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.3);
+}
+
+TEST(FixedLagSmootherTest, RefusesAFixBeforeItKnowsHowFastTheBodyIsWhereThatMatters) {
+  const auto drive = DriveSimulator({}, 1).Run();
+  FixedLagSmoother smoother(ConfigOfOffsetCamera());
+  FixedLagSmoother other{SmootherConfig()};
+  ASSERT_TRUE(smoother.AddOdometry(drive.log.odometry.front()));
+  ASSERT_TRUE(other.AddOdometry(drive.log.odometry.front()));
+  EXPECT_EQ(smoother.AddFix(drive.log.fixes.front()), FixOutcome::kLate);
+  EXPECT_EQ(other.AddFix(drive.log.fixes.front()), FixOutcome::kAccepted);
 }
 
 TEST(FixedLagSmootherTest, AJumpOfTheOdometryDoesNotSpoilWhatIsKnownOfTheCamera) {
