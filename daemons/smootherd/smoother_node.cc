@@ -478,6 +478,7 @@ void SmootherNode::AddFigures(const SmootherEstimate& estimate, NodeStatus& stat
   status.Add("fix_p50_ms", fix_latency_ms_.Percentile(0.5));
   status.Add("fix_p99_ms", fix_latency_ms_.Percentile(0.99));
   status.Add("odometry_drift_rad_per_m", smoother_.drift().rad_per_m());
+  status.Add("odometry_yaw_rate_bias_rad_per_s", smoother_.drift().rad_per_s());
   status.Add("odometry_scale", smoother_.drift().scale());
   const CameraOffset& camera = smoother_.camera();
   if (camera.IsSought()) {

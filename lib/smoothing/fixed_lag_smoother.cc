@@ -130,7 +130,9 @@ FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
                          .min_radius_m = config.relocalization_min_radius_m},
       history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
       chain_(static_cast<std::size_t>(config.window_keyframes) + 1),
-      drift_(config.odometry_drift_sigma_rad_per_m, config.odometry_scale_sigma) {
+      drift_({.rad_per_m = config.odometry_drift_sigma_rad_per_m,
+              .rad_per_s = config.odometry_yaw_rate_sigma_rad_per_s,
+              .scale = config.odometry_scale_sigma}) {
   window_.camera = CameraOf(config);
   const auto keyframes = static_cast<std::size_t>(config.window_keyframes) + 1;
   window_.keyframes.Reserve(keyframes);
@@ -202,7 +204,9 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
                              step.X_BprevB.y(),
                              step.X_BprevB.yaw())};
   }
-  const Pose2 X_AB = drift_.Correct(step.X_BprevB);
+  const auto motion =
+      MotionExtent::Of(step.X_BprevB, ToSeconds(step.time - history_.newest().time));
+  const Pose2 X_AB = drift_.Correct(step.X_BprevB, motion);
   newest_motion_ = X_AB;
   OdometrySample sample = history_.newest();
   sample.time = step.time;
@@ -210,7 +214,7 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
   sample.X_KB = sample.X_KB * X_AB;
   sample.covariance_KB = ComposeCovariance(sample.covariance_KB, X_AB, covariance);
   sample.step_covariance = covariance;
-  odometer_m_ += step.X_BprevB.translation().norm();
+  extent_ += motion;
 
   const double distance = sample.X_KB.translation().norm();
   const double turn = std::abs(sample.X_KB.yaw());
@@ -242,11 +246,11 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
   keyframe.time = sample.time;
   keyframe.generation = before.generation;
   keyframe.X_OB = sample.X_OB;
-  keyframe.odometer_m = odometer_m_;
+  keyframe.extent = extent_;
   keyframe.corrected_turn_rad = drift_.corrected_turn_rad();
   keyframe.corrected_way_m = drift_.corrected_way_m();
   keyframe.X_PK = sample.X_KB;
-  keyframe.drift_covariance_PK = drift_.Covariance(odometer_m_ - before.odometer_m);
+  keyframe.drift_covariance_PK = drift_.Covariance(extent_ - before.extent);
   keyframe.covariance_PK = sample.covariance_KB + keyframe.drift_covariance_PK;
   keyframe.SetX_WK(before.X_WK() * sample.X_KB);
   newest_covariance_ = ComposeCovariance(newest_covariance_, sample.X_KB, keyframe.covariance_PK);
@@ -409,7 +413,7 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
 void FixedLagSmoother::NoteSupport(const OdometrySample& sample) {
   if (!last_support_ || sample.time > *last_support_) {
     last_support_ = sample.time;
-    odometer_at_fix_m_ = odometer_m_;
+    odometer_at_fix_m_ = extent_.way_m;
   }
 }
 
@@ -598,7 +602,7 @@ std::optional<SmootherEstimate> FixedLagSmoother::EstimateAt(MonotonicTime time)
   estimate.time = time;
   if (last_support_) {
     estimate.time_since_fix_s = std::max(0.0, ToSeconds(time - *last_support_));
-    estimate.distance_since_fix_m = odometer_m_ - odometer_at_fix_m_;
+    estimate.distance_since_fix_m = extent_.way_m - odometer_at_fix_m_;
   }
   if (!is_started_) {
     if (!unstarted_fix_) return estimate;

@@ -192,7 +192,7 @@ class FixedLagSmoother {
   Pose2 newest_motion_;
   bool is_started_ = false;
   std::optional<Fix> unstarted_fix_;  ///< The newest, for a first position.
-  double odometer_m_ = 0.0;
+  MotionExtent extent_;               ///< Of all odometry.
   double odometer_at_fix_m_ = 0.0;
   std::optional<MonotonicTime> last_support_;
   std::int64_t agreements_since_start_ = 0;  ///< Fixes that lay where they were predicted.

@@ -17,6 +17,26 @@
 
 namespace relocd {
 
+/// How far the odometry has gone: that by which it can drift.
+struct MotionExtent {
+  double way_m = 0.0;
+  double driven_s = 0.0;  ///< But for the time in which it measured no motion at all.
+
+  /// Of one motion. One of exactly zero is that of a body which is known to stand.
+  static MotionExtent Of(const Pose2& motion, double seconds) {
+    const double way_m = motion.translation().norm();
+    return {way_m, way_m > 0.0 || motion.yaw() != 0.0 ? seconds : 0.0};
+  }
+  MotionExtent& operator+=(const MotionExtent& more) {
+    way_m += more.way_m;
+    driven_s += more.driven_s;
+    return *this;
+  }
+  friend MotionExtent operator-(const MotionExtent& a, const MotionExtent& b) {
+    return {a.way_m - b.way_m, a.driven_s - b.driven_s};
+  }
+};
+
 /// A pose that is estimated, and the composed odometry that leads to it.
 struct Keyframe {
   std::int64_t id = 0;  ///< One more than the keyframe before.
@@ -27,7 +47,7 @@ struct Keyframe {
   Eigen::Matrix3d covariance_PK = Eigen::Matrix3d::Identity();
   /// The part of it that is there because the odometry's drift was not known better.
   Eigen::Matrix3d drift_covariance_PK = Eigen::Matrix3d::Zero();
-  double odometer_m = 0.0;          ///< The way until here.
+  MotionExtent extent;              ///< Until here.
   double corrected_turn_rad = 0.0;  ///< Put into the odometry until here, by OdometryDrift.
   double corrected_way_m = 0.0;     ///< Likewise.
   /// How often the estimates had been started anew when this one was last estimated.

@@ -69,6 +69,7 @@ Result<void> SmootherConfig::Validate() const {
       {"max_iterations", static_cast<double>(max_iterations), 1.0, true, 100.0},
       {"odometry_covariance_factor", odometry_covariance_factor, 0.0, false},
       {"odometry_drift_sigma_rad_per_m", odometry_drift_sigma_rad_per_m, 0.0, true},
+      {"odometry_yaw_rate_sigma_rad_per_s", odometry_yaw_rate_sigma_rad_per_s, 0.0, true},
       {"odometry_scale_sigma", odometry_scale_sigma, 0.0, true},
       {"cauchy_scale_sigmas", cauchy_scale_sigmas, 0.0, false},
       {"gate_squared_mahalanobis", gate_squared_mahalanobis, 0.0, false},

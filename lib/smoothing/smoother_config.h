@@ -62,6 +62,7 @@ struct SmootherConfig {
   double default_fix_heading_sigma_rad = 0.05;
   double odometry_covariance_factor = 2.0;
   double odometry_drift_sigma_rad_per_m = 0.005;
+  double odometry_yaw_rate_sigma_rad_per_s = 0.0;
   double odometry_scale_sigma = 0.01;
   OdometryNoiseConfig default_odometry_noise;
 
@@ -108,6 +109,10 @@ struct SmootherConfig {
         "odometry_drift_sigma_rad_per_m",
         self.odometry_drift_sigma_rad_per_m,
         ">= 0; of a constant turn that the odometry gets wrong, which is estimated; 0: it is not");
+    visit("odometry_yaw_rate_sigma_rad_per_s",
+          self.odometry_yaw_rate_sigma_rad_per_s,
+          ">= 0; of a constant error of the yaw rate while the body moves, as of a sensor's bias, "
+          "likewise");
     visit("odometry_scale_sigma",
           self.odometry_scale_sigma,
           ">= 0; of a constant part of the travel that the odometry misses, likewise");

@@ -416,6 +416,53 @@ TEST(FixedLagSmootherTest, LearnsTheOdometrysConstantErrors) {
   EXPECT_LT(Summarize(learning).rmse, Summarize(not_learning).rmse);
 }
 
+/// What a drift of -0.004 rad/s, at 1.5 m/s, is found to be.
+OdometryDrift DriftOfASensorWithABias(const SmootherConfig& config, unsigned seed) {
+  auto drive = DriveSimulator({.duration_s = 300.0, .has_heading = false}, seed).Run();
+  std::vector<OdometryStep>& odometry = drive.log.odometry;
+  for (std::size_t i = 1; i < odometry.size(); ++i) {
+    const double period_s = ToSeconds(odometry[i].time - odometry[i - 1].time);
+    odometry[i].X_BprevB = odometry[i].X_BprevB * Pose2(0.0, 0.0, -0.004 * period_s);
+  }
+  FixedLagSmoother smoother(config);
+  const SmootherEstimate estimate = Drive(drive, smoother);
+  EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.6) << seed;
+  return smoother.drift();
+}
+
+TEST(FixedLagSmootherTest, LearnsTheBiasOfAYawRateSensor) {
+  SmootherConfig only;
+  only.odometry_drift_sigma_rad_per_m = 0.0;
+  only.odometry_yaw_rate_sigma_rad_per_s = 0.01;
+  SmootherConfig both;
+  both.odometry_yaw_rate_sigma_rad_per_s = 1.5 * both.odometry_drift_sigma_rad_per_m;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    const OdometryDrift found = DriftOfASensorWithABias(only, seed);
+    EXPECT_NEAR(found.rad_per_s(), 0.004, 0.001) << seed;
+    EXPECT_EQ(found.rad_per_m(), 0.0);
+    // One speed does not tell them apart: each gets its half.
+    const OdometryDrift shared = DriftOfASensorWithABias(both, seed);
+    EXPECT_NEAR(shared.rad_per_s(), 0.002, 0.0007) << seed;
+    EXPECT_NEAR(shared.rad_per_m(), 0.002 / 1.5, 0.0005) << seed;
+  }
+}
+
+TEST(FixedLagSmootherTest, DoesNotTurnABodyThatStands) {
+  SmootherConfig config;
+  config.odometry_yaw_rate_sigma_rad_per_s = 0.01;
+  const auto drive = DriveSimulator({.duration_s = 100.0}, 3).Run();
+  FixedLagSmoother smoother(config);
+  const SmootherEstimate before = Drive(drive, smoother);
+  OdometryStep step = drive.log.odometry.back();
+  step.X_BprevB = Pose2();
+  for (int i = 0; i < 1000; ++i) {
+    step.time += milliseconds(50);
+    ASSERT_TRUE(smoother.AddOdometry(step));
+  }
+  EXPECT_NE(smoother.drift().rad_per_s(), 0.0);
+  EXPECT_EQ(smoother.Estimate().X_WB.yaw(), before.X_WB.yaw());
+}
+
 /// A car whose encoders are good, as its covariances say, and whose radii are not.
 SimulatedDrive DriveOfGoodEncodersAndPoorRadii(unsigned seed) {
   DriveSimulator simulator({.duration_s = 100.0,

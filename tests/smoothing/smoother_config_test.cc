@@ -44,7 +44,7 @@ TEST(SmootherConfigTest, VisitsEveryField) {
     EXPECT_STRNE(comment, "");
     ++fields;
   });
-  EXPECT_EQ(fields, 32);
+  EXPECT_EQ(fields, 33);
 }
 
 }  // namespace
