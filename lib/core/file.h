@@ -19,9 +19,9 @@ Result<std::string> ReadFile(const std::string& path);
 Result<void> WriteFile(const std::string& path, std::string_view bytes);
 
 /// Replaces the file by `bytes` such that a reader, also one after a power cut, sees the old or the
-/// new content whole: writes beside it, syncs, renames, syncs the folder. A link stays one, to the
-/// new content. What is no file, as /dev/null or a pipe, is written to as it is: a rename by root
-/// would put a file in the place of the device.
+/// new content whole: writes beside it, syncs, renames, syncs the folder. A link to a file stays
+/// one, to the new content. What is no file, as /dev/null or a pipe, is written to as it is: a
+/// rename by root would put a file in the place of the device.
 ///
 /// @return kUnavailable when it cannot be written; the old file is then still there.
 Result<void> WriteFileAtomically(const std::string& path, std::string_view bytes);

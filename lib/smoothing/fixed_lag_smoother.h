@@ -127,8 +127,6 @@ class FixedLagSmoother {
 
   [[nodiscard]] const SmootherCounters& counters() const { return counters_; }
   [[nodiscard]] const KeyframeWindow& window() const { return window_; }
-  /// The window as it is at the end, when the smoother is no more needed.
-  [[nodiscard]] KeyframeWindow TakeWindow() && { return std::move(window_); }
   [[nodiscard]] const SmootherConfig& config() const { return config_; }
   [[nodiscard]] const FixWeighting& weighting() const { return weighting_; }
   [[nodiscard]] const OdometryDrift& drift() const { return drift_; }

@@ -76,8 +76,9 @@ void OdometryDrift::CorrectAnew(const Keyframe& before, Keyframe& keyframe) cons
   const Pose2 half(0.0, 0.0, 0.5 * turn);
   const Eigen::Vector2d translation = (1.0 + stretch) * keyframe.X_PK.translation();
   keyframe.X_PK = half * Pose2(translation.x(), translation.y(), keyframe.X_PK.yaw()) * half;
-  keyframe.covariance_PK += Covariance(motion) - keyframe.drift_covariance_PK;
-  keyframe.drift_covariance_PK = Covariance(motion);
+  const Eigen::Matrix3d covariance = Covariance(motion);
+  keyframe.covariance_PK += covariance - keyframe.drift_covariance_PK;
+  keyframe.drift_covariance_PK = covariance;
 }
 
 void OdometryDrift::Estimate(const KeyframeWindow& window, const Eigen::Matrix3d& covariance) {

@@ -147,7 +147,7 @@ TEST(FixedLagSmootherTest, IsAtTheMinimumOfItsWindow) {
   const Pose2 X_WB = Drive(drive, smoother).X_WB;
   const Pose2 X_KB = smoother.window().keyframes.back().X_WK().Inverse() * X_WB;
   const FixWeighting weighting = smoother.weighting();
-  KeyframeWindow window = std::move(smoother).TakeWindow();
+  KeyframeWindow window = smoother.window();
   ASSERT_TRUE(SolveBatch(window, weighting, 200));
   EXPECT_LT(PositionError(window.keyframes.back().X_WK() * X_KB, X_WB), 0.06);
 }
