@@ -172,10 +172,12 @@ Result<void> RunOdometry(const Options& options) {
   if (!after) return std::move(after).error();
   if (options.can.empty()) Correct(*calibration, *after);
 
-  const auto judged = Select(*references, *before, *judge);
-  const auto was = JudgeOdometry(before->X_OBs, before->origin_ns, judged, calibration->drive);
+  const auto bodies = SmoothReference(
+      *before, Select(*references, *before, *judge), *calibration, options.spacing_s);
+  const double offset_s = calibration->drive.time_offset_s;
+  const auto was = JudgeOdometry(before->X_OBs, before->origin_ns, bodies, offset_s);
   if (!was) return Error(was.error()).WithContext(options.reference);
-  const auto is = JudgeOdometry(after->X_OBs, after->origin_ns, judged, calibration->drive);
+  const auto is = JudgeOdometry(after->X_OBs, after->origin_ns, bodies, offset_s);
   if (!is) return Error(is.error()).WithContext(options.reference);
   fmt::print("{}\n{}\n{}",
              FormatParameters(*calibration),

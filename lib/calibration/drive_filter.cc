@@ -18,8 +18,6 @@ namespace {
 constexpr double kMaxDistance = 4.0;
 /// Of the travel of slipping wheels.
 constexpr double kSlip = 0.3;
-/// How far the time offset may reach beyond the recording's ends.
-constexpr double kMarginS = 0.5;
 
 double Square(double value) {
   return value * value;
@@ -51,10 +49,11 @@ Innovation Innovate(const Pose2& X_WB,
 
 DriveFilter::DriveFilter(const OdometryRecording& recording,
                          std::vector<ReferencePose> references,
-                         TurnSource source)
+                         TurnSource source,
+                         double margin_s)
     : recording_(recording), source_(source) {
-  const double begin_s = recording.samples.front().time_s + kMarginS;
-  const double end_s = recording.samples.back().time_s - kMarginS;
+  const double begin_s = recording.samples.front().time_s + margin_s;
+  const double end_s = recording.samples.back().time_s - margin_s;
   std::copy_if(references.begin(),
                references.end(),
                std::back_inserter(references_),
@@ -166,12 +165,47 @@ void DriveFilter::Predict(const Instant& from,
   state.covariance.diagonal() += variance;
 }
 
+Eigen::VectorXd DriveFilter::Correct(const ReferencePose& reference,
+                                     const DriveParameters& parameters,
+                                     const DriveNoise& noise,
+                                     State& state,
+                                     DriveFit& fit) {
+  const Pose2 X_BR(parameters.mount_x_m, parameters.mount_y_m, parameters.mount_yaw_rad);
+  const Innovation innovation = Innovate(state.X_WB, X_BR, reference, noise);
+  const Eigen::MatrixXd& jacobian = innovation.jacobian;
+  const Eigen::MatrixXd predicted = jacobian * state.covariance * jacobian.transpose();
+  Eigen::VectorXd variance = innovation.variance;
+  Eigen::LLT<Eigen::MatrixXd> llt(predicted + Eigen::MatrixXd(variance.asDiagonal()));
+  const double distance = llt.matrixL().solve(innovation.residual).norm();
+  if (distance > kMaxDistance) {
+    ++fit.outliers;
+    variance *= Square(distance / kMaxDistance);
+    llt.compute(predicted + Eigen::MatrixXd(variance.asDiagonal()));
+  }
+  Eigen::VectorXd whitened = llt.matrixL().solve(innovation.residual);
+  fit.cost +=
+      whitened.squaredNorm() + 2.0 * Eigen::MatrixXd(llt.matrixL()).diagonal().array().log().sum();
+  const Eigen::MatrixXd gain = llt.solve(jacobian * state.covariance).transpose();
+  state.X_WB = state.X_WB * Pose2::Exp(gain * innovation.residual);
+  const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * jacobian;
+  // Joseph's form, which stays positive definite.
+  state.covariance =
+      rest * state.covariance * rest.transpose() + gain * variance.asDiagonal() * gain.transpose();
+  return whitened;
+}
+
 DriveFit DriveFilter::Run(const DriveParameters& parameters, const DriveNoise& noise) const {
+  return Pass(parameters, noise, nullptr);
+}
+
+DriveFit DriveFilter::Pass(const DriveParameters& parameters,
+                           const DriveNoise& noise,
+                           std::vector<Step>* steps) const {
   DriveFit fit;
   fit.residuals.resize(static_cast<Eigen::Index>(3 * references_.size()));
   if (references_.empty()) return fit;
-  const Pose2 X_BR(parameters.mount_x_m, parameters.mount_y_m, parameters.mount_yaw_rad);
   State state = Begin(parameters, noise);
+  if (steps != nullptr) steps->push_back({.predicted = state, .corrected = state});
   const auto& samples = recording_.samples;
   const auto clamp_s = [&](double time_s) {
     return std::clamp(time_s, samples.front().time_s, samples.back().time_s);
@@ -194,32 +228,35 @@ DriveFit DriveFilter::Run(const DriveParameters& parameters, const DriveNoise& n
       if (next.time_s <= now.time_s) break;
       now = next;
     }
-    const Innovation innovation = Innovate(state.X_WB, X_BR, references_[k], noise);
-    const Eigen::MatrixXd& jacobian = innovation.jacobian;
-    const Eigen::MatrixXd predicted = jacobian * state.covariance * jacobian.transpose();
-    Eigen::VectorXd variance = innovation.variance;
-    Eigen::LLT<Eigen::MatrixXd> llt(predicted + Eigen::MatrixXd(variance.asDiagonal()));
-    const double distance = llt.matrixL().solve(innovation.residual).norm();
-    if (distance > kMaxDistance) {
-      ++fit.outliers;
-      variance *= Square(distance / kMaxDistance);
-      llt.compute(predicted + Eigen::MatrixXd(variance.asDiagonal()));
-    }
-    const Eigen::VectorXd whitened = llt.matrixL().solve(innovation.residual);
+    const State predicted = state;
+    const Eigen::VectorXd whitened = Correct(references_[k], parameters, noise, state, fit);
     fit.residuals.segment(row, whitened.size()) = whitened;
     row += whitened.size();
-    fit.cost += whitened.squaredNorm() +
-                2.0 * Eigen::MatrixXd(llt.matrixL()).diagonal().array().log().sum();
-    const Eigen::MatrixXd gain = llt.solve(jacobian * state.covariance).transpose();
-    state.X_WB = state.X_WB * Pose2::Exp(gain * innovation.residual);
-    const Eigen::Matrix3d rest = Eigen::Matrix3d::Identity() - gain * jacobian;
-    // Joseph's form, which stays positive definite.
-    state.covariance = rest * state.covariance * rest.transpose() +
-                       gain * variance.asDiagonal() * gain.transpose();
+    if (steps != nullptr) steps->push_back({.predicted = predicted, .corrected = state});
   }
   fit.references = static_cast<int>(references_.size());
   fit.residuals.conservativeResize(row);
   return fit;
+}
+
+std::vector<ReferencePose> DriveFilter::Smooth(const DriveParameters& parameters,
+                                               const DriveNoise& noise) const {
+  std::vector<Step> steps;
+  Pass(parameters, noise, &steps);
+  std::vector<ReferencePose> smoothed(steps.size());
+  for (std::size_t k = steps.size(); k-- > 0;) {
+    Pose2 X_WB = steps[k].corrected.X_WB;
+    if (k + 1 < steps.size()) {
+      const State& next = steps[k + 1].predicted;
+      // What was predicted turns and moves an error of the state before it by this.
+      const Eigen::Matrix3d transport = (next.X_WB.Inverse() * X_WB).Adjoint();
+      const Eigen::Matrix3d gain =
+          next.covariance.llt().solve(transport * steps[k].corrected.covariance).transpose();
+      X_WB = X_WB * Pose2::Exp(gain * (next.X_WB.Inverse() * smoothed[k + 1].X_WR).Log());
+    }
+    smoothed[k] = {.time_s = references_[k].time_s, .X_WR = X_WB, .has_heading = true};
+  }
+  return smoothed;
 }
 
 }  // namespace relocd

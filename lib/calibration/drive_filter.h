@@ -63,12 +63,19 @@ struct DriveFit {
 /// Borrows the recording, which must outlive it. Thread-bound.
 class DriveFilter {
  public:
-  /// References outside of the recording are left out.
+  /// References outside of the recording, or nearer to its ends than `margin_s`, by which the time
+  /// offset may be looked for, are left out.
   DriveFilter(const OdometryRecording& recording,
               std::vector<ReferencePose> references,
-              TurnSource source);
+              TurnSource source,
+              double margin_s);
 
   [[nodiscard]] DriveFit Run(const DriveParameters& parameters, const DriveNoise& noise) const;
+
+  /// Where the body was at the references' times, with headings, by all of them and the recording
+  /// together (Rauch, Tung and Striebel): what is off in single references is taken out of it.
+  [[nodiscard]] std::vector<ReferencePose> Smooth(const DriveParameters& parameters,
+                                                  const DriveNoise& noise) const;
 
   [[nodiscard]] const std::vector<ReferencePose>& references() const { return references_; }
 
@@ -86,7 +93,16 @@ class DriveFilter {
     Pose2 X_WB;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   };
+  /// At one reference.
+  struct Step {
+    State predicted;
+    State corrected;
+  };
 
+  /// @param steps  nullptr: they are not asked for.
+  DriveFit Pass(const DriveParameters& parameters,
+                const DriveNoise& noise,
+                std::vector<Step>* steps) const;
   [[nodiscard]] Instant At(std::size_t index, double time_s) const;
   [[nodiscard]] State Begin(const DriveParameters& parameters, const DriveNoise& noise) const;
   void Predict(const Instant& from,
@@ -99,6 +115,12 @@ class DriveFilter {
                                      const Instant& to,
                                      const DriveParameters& parameters,
                                      const DriveNoise& noise) const;
+  /// Takes a reference into the state. @return its whitened innovation.
+  static Eigen::VectorXd Correct(const ReferencePose& reference,
+                                 const DriveParameters& parameters,
+                                 const DriveNoise& noise,
+                                 State& state,
+                                 DriveFit& fit);
 
   const OdometryRecording& recording_;
   std::vector<ReferencePose> references_;

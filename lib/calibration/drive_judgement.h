@@ -15,7 +15,7 @@ struct DriveJudgement {
   double end_s = 0.0;
   double length_m = 0.0;           ///< Of the reference.
   double distance_error = 0.0;     ///< Of odometry's length, as part of the reference's.
-  double heading_error_rad = 0.0;  ///< At the end; 0 without headings.
+  double heading_error_rad = 0.0;  ///< At the end.
   double worst_heading_error_rad = 0.0;
   double position_error_m = 0.0;  ///< At the end.
   double worst_position_error_m = 0.0;
@@ -23,15 +23,14 @@ struct DriveJudgement {
   std::vector<Eigen::Vector2d> odometry_m;
 };
 
-/// @param X_OBs       odometry.
-/// @param origin_ns   what the reference's times count from.
-/// @param references  those to compare with; their begin must have a heading.
-/// @param parameters  for the mounting and the time offset.
-/// @return kInvalidInput when fewer than two references lie within odometry's time, or the first of
-///         them has no heading.
+/// @param X_OBs          odometry.
+/// @param origin_ns      what the bodies' times count from.
+/// @param bodies         where the body was, as SmoothReference gives it.
+/// @param time_offset_s  odometry's time less that of the bodies.
+/// @return kInvalidInput when fewer than two bodies lie within odometry's time.
 Result<DriveJudgement> JudgeOdometry(const Trajectory2& X_OBs,
                                      std::int64_t origin_ns,
-                                     const std::vector<ReferencePose>& references,
-                                     const DriveParameters& parameters);
+                                     const std::vector<ReferencePose>& bodies,
+                                     double time_offset_s);
 
 }  // namespace relocd

@@ -11,6 +11,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "calibration/reference_selection.h"
 #include "geometry/angle.h"
 
 namespace relocd {
@@ -42,6 +43,8 @@ constexpr std::array<Prior, 2> kSteeringPriors = {{
     {"steering_ratio", &DriveParameters::steering_ratio, 5.0},
     {"steering_offset", &DriveParameters::steering_offset_rad, 0.5},
 }};
+/// How far the time offset may reach beyond the recording's ends.
+constexpr double kMarginS = 0.5;
 /// A parameter whose deviation the drive left above this part of what it was is not known.
 constexpr double kKnownPart = 0.5;
 /// Below this turning along the way says nothing of its noise.
@@ -197,15 +200,6 @@ class Fitter {
   Eigen::VectorXd sigmas_;
 };
 
-std::vector<ReferencePose> Thin(const std::vector<ReferencePose>& references, double spacing_s) {
-  std::vector<ReferencePose> thinned;
-  for (const ReferencePose& reference : references) {
-    if (thinned.empty() || reference.time_s >= thinned.back().time_s + spacing_s)
-      thinned.push_back(reference);
-  }
-  return thinned;
-}
-
 /// Looks for parameters, gives up those that the drive does not tell, and looks for the others
 /// again.
 DriveFit Calibrate(const DriveFilter& filter,
@@ -291,14 +285,14 @@ void CalibrateSensors(const OdometryRecording& recording,
                       const std::set<std::string>& fixed,
                       OdometryCalibration& calibration) {
   if (recording.has_yaw_rate) {
-    const DriveFilter filter(recording, references, TurnSource::kYawRate);
+    const DriveFilter filter(recording, references, TurnSource::kYawRate, kMarginS);
     Calibrate(filter,
               {.priors = {kYawRatePriors.begin(), kYawRatePriors.end()}, .levels = {kYawRateNoise}},
               fixed,
               calibration);
   }
   if (recording.has_steering) {
-    const DriveFilter filter(recording, references, TurnSource::kSteering);
+    const DriveFilter filter(recording, references, TurnSource::kSteering, kMarginS);
     Calibrate(
         filter,
         {.priors = {kSteeringPriors.begin(), kSteeringPriors.end()}, .levels = {kSteeringSigma}},
@@ -382,20 +376,23 @@ Result<OdometryCalibration> CalibrateOdometry(const OdometryRecording& recording
                                               const std::vector<ReferencePose>& references,
                                               const OdometryConfig& config,
                                               const OdometryCalibrationOptions& options) {
-  const DriveFilter filter(recording, Thin(references, options.spacing_s), TurnSource::kWheels);
+  const ReferenceSelection selection = SelectReferences(recording, references, options.spacing_s);
+  const DriveFilter filter(recording, selection.poses, TurnSource::kWheels, kMarginS);
   const Extent extent = Measure(filter.references());
   constexpr std::size_t kLeastReferences = 10;
   constexpr double kLeastLengthM = 5.0;
   if (filter.references().size() < kLeastReferences || extent.length_m < kLeastLengthM) {
     return Error{
         ErrorKind::kInvalidInput,
-        fmt::format("the reference has {} poses over {:.1f} m while the vehicle was recorded, "
-                    "must have at least {}, {} s apart, over {} m",
-                    filter.references().size(),
-                    extent.length_m,
-                    kLeastReferences,
-                    options.spacing_s,
-                    kLeastLengthM)};
+        fmt::format(
+            "the reference has {} poses over {:.1f} m while the vehicle was recorded, and {} that "
+            "odometry contradicts, must have at least {}, {} s apart, over {} m",
+            filter.references().size(),
+            extent.length_m,
+            selection.disagreeing,
+            kLeastReferences,
+            options.spacing_s,
+            kLeastLengthM)};
   }
   OdometryCalibration calibration;
   calibration.drive = InitialParameters(config, options.initial);
@@ -417,13 +414,24 @@ Result<OdometryCalibration> CalibrateOdometry(const OdometryRecording& recording
       calibration.noise.lateral_sigma_m_per_sqrt_m > 3.0 * kLateralSigma.low;
   calibration.has_turn_noise = calibration.has_turn_noise &&
                                calibration.noise.turn_sigma_rad_per_sqrt_rad > 3.0 * kTurnSigma.low;
-  calibration.references = fit.references;
-  calibration.outliers = fit.outliers;
+  calibration.references = fit.references + selection.disagreeing;
+  calibration.outliers = fit.outliers + selection.disagreeing;
   calibration.residual_rms =
       std::sqrt(fit.residuals.squaredNorm() / static_cast<double>(fit.residuals.size()));
   CalibrateSensors(recording, filter.references(), fixed, calibration);
   if (recording.has_front) CalibrateFront(recording, calibration);
   return calibration;
+}
+
+std::vector<ReferencePose> SmoothReference(const OdometryRecording& recording,
+                                           const std::vector<ReferencePose>& references,
+                                           const OdometryCalibration& calibration,
+                                           double spacing_s) {
+  return DriveFilter(recording,
+                     SelectReferences(recording, references, spacing_s).poses,
+                     TurnSource::kWheels,
+                     std::abs(calibration.drive.time_offset_s))
+      .Smooth(calibration.drive, calibration.noise);
 }
 
 OdometryConfig ApplyCalibration(const OdometryConfig& config,

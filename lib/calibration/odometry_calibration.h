@@ -54,6 +54,15 @@ Result<OdometryCalibration> CalibrateOdometry(const OdometryRecording& recording
                                               const OdometryConfig& config,
                                               const OdometryCalibrationOptions& options);
 
+/// Where the body was by a reference and the calibrated recording together, `spacing_s` apart.
+///
+/// What odometry is to be judged by: the reference itself may have single poses that are far off,
+/// no headings, or noise that makes its way longer than the body's.
+std::vector<ReferencePose> SmoothReference(const OdometryRecording& recording,
+                                           const std::vector<ReferencePose>& references,
+                                           const OdometryCalibration& calibration,
+                                           double spacing_s);
+
 /// The config with what was found in it.
 OdometryConfig ApplyCalibration(const OdometryConfig& config,
                                 const OdometryCalibration& calibration);

@@ -181,8 +181,9 @@ TEST(OdometryCalibrationTest, MakesTheSameCarDriveTrulyOnAnotherWay) {
     const Recorded again = Record(other, X_WBs, 77);
     return JudgeOdometry(again.recording.X_OBs,
                          again.recording.origin_ns,
-                         again.references,
-                         calibration->drive)
+                         SmoothReference(
+                             Record(car, X_WBs, 77).recording, again.references, *calibration, 0.5),
+                         car.reference.time_offset_s)
         .value();
   };
   const DriveJudgement before = judge(car.config);
@@ -212,24 +213,59 @@ TEST(OdometryCalibrationTest, SaysThatAStraightRoadTellsNothingOfTheTrack) {
   EXPECT_NEAR(right.after - left.after, -0.003, 0.001);
 }
 
-TEST(OdometryCalibrationTest, CountsReferencesThatAreFarOffLess) {
-  const Car car = MakeCar();
-  Recorded recorded = Record(car, Drive(false), 4);
+/// The references with three of ten far off, the first one among them.
+Recorded WithOutliers(Recorded recorded) {
   TestRandom random(9);
-  for (std::size_t i = 5; i < recorded.references.size(); ++i) {
-    if (random.Integer(0, 9) == 0) {
-      recorded.references[i].X_WR =
-          recorded.references[i].X_WR * Pose2(random.Normal(20.0), random.Normal(20.0), 0.5);
-    }
+  for (std::size_t i = 0; i < recorded.references.size(); ++i) {
+    if (i != 0 && random.Integer(0, 9) >= 3) continue;
+    recorded.references[i].X_WR =
+        recorded.references[i].X_WR * Pose2(random.Normal(20.0), random.Normal(20.0), 0.5);
   }
+  return recorded;
+}
+
+TEST(OdometryCalibrationTest, ReferencesThatAreFarOffDoNotCount) {
+  const Car car = MakeCar();
+  const Recorded recorded = WithOutliers(Record(car, Drive(false), 4));
   const auto calibration =
       CalibrateOdometry(recorded.recording, recorded.references, car.config, {});
   ASSERT_TRUE(calibration) << calibration.error().message;
-  EXPECT_GT(calibration->outliers, 5);
+  EXPECT_GT(calibration->outliers, 40);
+  EXPECT_NEAR(calibration->residual_rms, 1.0, 0.2);
+  EXPECT_NEAR(calibration->noise.wheel_sigma_m_per_sqrt_m, 0.006, 0.003);
   for (const Truth& truth : Truths(car)) {
     const CalibratedParameter& parameter = Find(*calibration, truth.name);
-    EXPECT_NEAR(parameter.after, truth.value, 5.0 * parameter.sigma) << truth.name;
+    EXPECT_NEAR(parameter.after, truth.value, 4.0 * parameter.sigma) << truth.name;
   }
+}
+
+/// Neither outliers nor noise nor missing headings are left in what odometry is judged by.
+TEST(OdometryCalibrationTest, JudgesByWhereTheBodyWas) {
+  const Car car = MakeCar();
+  const Trajectory2 X_WBs = Drive(false);
+  Recorded recorded = WithOutliers(Record(car, X_WBs, 4));
+  for (ReferencePose& reference : recorded.references)
+    reference.has_heading = false;
+  const auto calibration =
+      CalibrateOdometry(recorded.recording,
+                        recorded.references,
+                        car.config,
+                        {.initial = car.reference, .fixed = {"mount_x", "mount_y"}});
+  ASSERT_TRUE(calibration) << calibration.error().message;
+  const auto bodies = SmoothReference(recorded.recording, recorded.references, *calibration, 0.5);
+  ASSERT_GT(bodies.size(), 100U);
+  double squared_m2 = 0.0;
+  for (const ReferencePose& body : bodies) {
+    const auto time_ns = recorded.recording.origin_ns +
+                         std::llround(1e9 * (body.time_s + calibration->drive.time_offset_s));
+    const auto X_WB = Interpolate(X_WBs, time_ns, 1'000'000'000);
+    ASSERT_TRUE(X_WB);
+    const Pose2 error = X_WB->Inverse() * body.X_WR;
+    EXPECT_LT(std::abs(error.yaw()), 0.04) << body.time_s;
+    squared_m2 += error.translation().squaredNorm();
+  }
+  // A single reference is off by 0.07 m.
+  EXPECT_LT(std::sqrt(squared_m2 / static_cast<double>(bodies.size())), 0.05);
 }
 
 TEST(OdometryCalibrationTest, NeedsNoHeadingsOfTheReference) {

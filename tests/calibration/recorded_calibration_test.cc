@@ -41,8 +41,11 @@ TEST(RecordedCalibrationTest, KeepsTheSecondHalfOfARealDrive) {
   const auto calibration = CalibrateOdometry(before, first, config.odometry, {});
   ASSERT_TRUE(calibration) << calibration.error().message;
   const OdometryRecording after = record(ApplyCalibration(config.odometry, *calibration));
-  const auto judgement =
-      JudgeOdometry(after.X_OBs, after.origin_ns, second, calibration->drive).value();
+  const auto judgement = JudgeOdometry(after.X_OBs,
+                                       after.origin_ns,
+                                       SmoothReference(before, second, *calibration, 0.5),
+                                       calibration->drive.time_offset_s)
+                             .value();
   const double heading_deg = judgement.heading_error_rad * 180.0 / std::numbers::pi;
   fmt::print("second half, {:.0f} m: distance {:+.2f} %, heading {:+.2f} deg, position {:.1f} m\n",
              judgement.length_m,

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/csv.h"
 #include "geometry/pose2.h"
 #include "support/random.h"
 #include "support/run_program.h"
@@ -66,6 +67,25 @@ TEST_F(RelocCalibrateTest, FindsTheScaleOfMotionsAndDrawsThem) {
   EXPECT_THAT(ended.output, HasSubstr("    left_scale: 0.98"));
   EXPECT_THAT(ended.output, Not(HasSubstr("mount_x")));
   EXPECT_GT(std::filesystem::file_size(folder_.path() + "/plot.png"), 5000U);
+}
+
+/// As of RTK, or of fixes without a heading.
+TEST_F(RelocCalibrateTest, NeedsNoHeadings) {
+  WriteDrive();
+  const CsvTable truth = CsvTable::Read(folder_.path() + "/truth.csv").value();
+  std::string positions = "time_ns,x_m,y_m\n";
+  for (std::size_t row = 0; row < truth.row_count(); ++row)
+    positions +=
+        fmt::format("{},{},{}\n", truth.Text(row, 0), truth.Text(row, 1), truth.Text(row, 2));
+  const Ended ended = Run(fmt::format(
+      "odometry --config {}ackermann_demo.yaml --odometry {}/odometry.csv --reference {}",
+      kVehicles,
+      folder_.path(),
+      folder_.Write("positions.csv", positions)));
+  ASSERT_EQ(ended.exit_code, 0) << ended.output;
+  EXPECT_THAT(ended.output, testing::ContainsRegex("left_scale +1 +0.980[0-9]* +[0-9]"));
+  EXPECT_THAT(ended.output, testing::ContainsRegex("distance +(1.9|2.0)[0-9] +-?0.[0-2][0-9] %"));
+  EXPECT_THAT(ended.output, Not(HasSubstr("mount_yaw")));
 }
 
 TEST_F(RelocCalibrateTest, SaysWhatIsWrong) {
