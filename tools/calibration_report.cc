@@ -79,16 +79,15 @@ std::string FormatParameters(const OdometryCalibration& calibration) {
     }
   }
   const DriveNoise& noise = calibration.noise;
+  const auto measured = [](bool is_measured, double value, const char* unit) {
+    return is_measured ? fmt::format("{:.2g} {}", value, unit)
+                       : std::string("not known from this drive");
+  };
   text += fmt::format(
-      "\nmeasured noise: wheels {:.2g} m after 1 m, sideways {}, turning {}; reference {:.2g} m, "
-      "{:.2g} deg\n",
-      noise.wheel_sigma_m_per_sqrt_m,
-      calibration.has_lateral_noise
-          ? fmt::format("{:.2g} m after 1 m", noise.lateral_sigma_m_per_sqrt_m)
-          : "not known from this drive",
-      calibration.has_turn_noise
-          ? fmt::format("{:.2g} rad after 1 rad", noise.turn_sigma_rad_per_sqrt_rad)
-          : "not known from this drive",
+      "\nmeasured noise: wheels {}, sideways {}, turning {}; reference {:.2g} m, {:.2g} deg\n",
+      measured(calibration.has_wheel_noise, noise.wheel_sigma_m_per_sqrt_m, "m after 1 m"),
+      measured(calibration.has_lateral_noise, noise.lateral_sigma_m_per_sqrt_m, "m after 1 m"),
+      measured(calibration.has_turn_noise, noise.turn_sigma_rad_per_sqrt_rad, "rad after 1 rad"),
       noise.reference_sigma_m,
       noise.reference_sigma_rad * kDegreesPerRadian);
   return text;

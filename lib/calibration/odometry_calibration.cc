@@ -65,6 +65,11 @@ constexpr NoiseLevel kSteeringSigma{&DriveNoise::steering_sigma_rad, 1e-5, 1.0};
 constexpr NoiseLevel kReferenceSigma{&DriveNoise::reference_sigma_m, 1e-4, 100.0};
 constexpr NoiseLevel kReferenceHeadingSigma{&DriveNoise::reference_sigma_rad, 1e-5, 3.0};
 
+/// A noise that came out at its lower limit is one that the reference's hides.
+bool IsMeasured(const DriveNoise& noise, const NoiseLevel& level) {
+  return noise.*level.value > 3.0 * level.low;
+}
+
 /// What is looked for in one go.
 struct Search {
   std::vector<Prior> priors{};
@@ -290,6 +295,7 @@ void CalibrateSensors(const OdometryRecording& recording,
               {.priors = {kYawRatePriors.begin(), kYawRatePriors.end()}, .levels = {kYawRateNoise}},
               fixed,
               calibration);
+    calibration.has_yaw_rate_noise = IsMeasured(calibration.noise, kYawRateNoise);
   }
   if (recording.has_steering) {
     const DriveFilter filter(recording, references, TurnSource::kSteering, kMarginS);
@@ -298,6 +304,7 @@ void CalibrateSensors(const OdometryRecording& recording,
         {.priors = {kSteeringPriors.begin(), kSteeringPriors.end()}, .levels = {kSteeringSigma}},
         fixed,
         calibration);
+    calibration.has_steering_noise = IsMeasured(calibration.noise, kSteeringSigma);
   }
 }
 
@@ -307,52 +314,101 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-/// How far a front wheel should have rolled by the calibrated rear axle, over what it measured, for
-/// each second.
-std::vector<double> FrontRatios(const OdometryRecording& recording,
-                                const DriveParameters& drive,
-                                std::size_t wheel) {
+/// How far the front wheels, left and right, should have rolled by the calibrated rear axle in
+/// about a second, and what they measured.
+struct FrontBlock {
+  Eigen::Array2d expected_m = Eigen::Array2d::Zero();
+  Eigen::Array2d measured_m = Eigen::Array2d::Zero();
+  bool is_slipping = false;
+
+  [[nodiscard]] Eigen::Array2d Ratio() const { return expected_m / measured_m; }
+};
+
+/// Of the recording's part from `begin_s` to `end_s`, as far as the wheels rolled without slip.
+std::vector<FrontBlock> FrontBlocks(const OdometryRecording& recording,
+                                    const DriveParameters& drive,
+                                    double begin_s,
+                                    double end_s) {
   constexpr double kBlockS = 1.0;
   constexpr double kLeastM = 0.5;
   const auto& samples = recording.samples;
-  const double y_m = (wheel == 2 ? 0.5 : -0.5) * drive.track_m;
-  std::vector<double> ratios;
-  double expected_m = 0.0;
-  std::size_t begin = 0;
+  std::vector<FrontBlock> blocks;
+  FrontBlock block;
+  double block_s = begin_s;
   for (std::size_t i = 1; i < samples.size(); ++i) {
-    const double left_m = drive.left_scale * (samples[i].travel_m[0] - samples[i - 1].travel_m[0]);
-    const double right_m =
-        drive.right_scale * (samples[i].travel_m[1] - samples[i - 1].travel_m[1]);
+    const auto& from = samples[i - 1];
+    const auto& to = samples[i];
+    if (from.time_s < begin_s || to.time_s > end_s) continue;
+    const double left_m = drive.left_scale * (to.travel_m[0] - from.travel_m[0]);
+    const double right_m = drive.right_scale * (to.travel_m[1] - from.travel_m[1]);
     const double turn_rad = (right_m - left_m) / drive.track_m;
-    const double along_m = 0.5 * (left_m + right_m) - y_m * turn_rad;
-    expected_m += std::copysign(std::hypot(along_m, drive.wheelbase_m * turn_rad), along_m);
-    if (samples[i].time_s < samples[begin].time_s + kBlockS) continue;
-    const double measured_m = samples[i].travel_m.at(wheel) - samples[begin].travel_m.at(wheel);
-    if (std::abs(measured_m) > kLeastM) ratios.push_back(expected_m / measured_m);
-    expected_m = 0.0;
-    begin = i;
+    for (Eigen::Index side = 0; side < 2; ++side) {
+      const double y_m = (side == 0 ? 0.5 : -0.5) * drive.track_m;
+      const double along_m = 0.5 * (left_m + right_m) - y_m * turn_rad;
+      block.expected_m[side] +=
+          std::copysign(std::hypot(along_m, drive.wheelbase_m * turn_rad), along_m);
+      const auto wheel = static_cast<std::size_t>(2 + side);
+      block.measured_m[side] += to.travel_m.at(wheel) - from.travel_m.at(wheel);
+    }
+    block.is_slipping = block.is_slipping || to.is_slipping;
+    if (to.time_s < block_s + kBlockS) continue;
+    if (!block.is_slipping && block.measured_m.abs().minCoeff() > kLeastM) blocks.push_back(block);
+    block = {};
+    block_s = to.time_s;
   }
-  return ratios;
+  return blocks;
 }
 
-/// The front wheels' scales, by the median over seconds.
-void CalibrateFront(const OdometryRecording& recording, OdometryCalibration& calibration) {
-  constexpr std::size_t kLeastRatios = 5;
-  for (std::size_t wheel = 2; wheel < OdometryRecording::kWheels; ++wheel) {
-    std::vector<double> ratios = FrontRatios(recording, calibration.drive, wheel);
-    CalibratedParameter parameter{.name = wheel == 2 ? "front_left_scale" : "front_right_scale",
+/// Leaves out blocks in which a front wheel rolled unlike in most others.
+void DropOutliers(std::vector<FrontBlock>& blocks) {
+  constexpr double kMaxDeviations = 4.0;
+  constexpr double kSigmaOfMedian = 1.4826;  // of a normal distribution
+  for (Eigen::Index side = 0; side < 2; ++side) {
+    std::vector<double> ratios;
+    for (const FrontBlock& block : blocks)
+      ratios.push_back(block.Ratio()[side]);
+    const double median = Median(ratios);
+    for (double& ratio : ratios)
+      ratio = std::abs(ratio - median);
+    const double allowed = kMaxDeviations * kSigmaOfMedian * Median(ratios) + 1e-9;
+    std::erase_if(blocks, [&](const FrontBlock& block) {
+      return std::abs(block.Ratio()[side] - median) > allowed;
+    });
+  }
+}
+
+/// The front wheels' scales: the way they should have rolled over the way they measured. What the
+/// drive's torque slips is the same on both sides, and back and forth in part; medians of single
+/// seconds, each wheel's by itself, would have the heading pay for it.
+void CalibrateFront(const OdometryRecording& recording,
+                    double begin_s,
+                    double end_s,
+                    OdometryCalibration& calibration) {
+  constexpr std::size_t kLeastBlocks = 5;
+  std::vector<FrontBlock> blocks = FrontBlocks(recording, calibration.drive, begin_s, end_s);
+  const bool is_known = blocks.size() >= kLeastBlocks;
+  FrontBlock sum;
+  Eigen::Array2d squared = Eigen::Array2d::Zero();
+  if (is_known) {
+    DropOutliers(blocks);
+    for (const FrontBlock& block : blocks) {
+      sum.expected_m += block.expected_m;
+      sum.measured_m += block.measured_m;
+    }
+    for (const FrontBlock& block : blocks)
+      squared += (block.Ratio() - sum.Ratio()).square();
+  }
+  const auto count = static_cast<double>(blocks.size());
+  for (Eigen::Index side = 0; side < 2; ++side) {
+    CalibratedParameter parameter{.name = side == 0 ? "front_left_scale" : "front_right_scale",
                                   .before = 1.0,
                                   .expected_sigma = 0.05,
                                   .after = 1.0,
-                                  .sigma = 0.05};
-    if (ratios.size() >= kLeastRatios) {
-      parameter.after = Median(ratios);
-      for (double& ratio : ratios)
-        ratio = std::abs(ratio - parameter.after);
-      // Of a normal distribution: sigma from the median deviation, and of a median from sigma.
-      parameter.sigma =
-          1.4826 * Median(ratios) * 1.2533 / std::sqrt(static_cast<double>(ratios.size()));
-      parameter.is_known = true;
+                                  .sigma = 0.05,
+                                  .is_known = is_known};
+    if (is_known) {
+      parameter.after = sum.Ratio()[side];
+      parameter.sigma = std::sqrt(squared[side] / (count - 1.0) / count);
     }
     calibration.parameters.push_back(parameter);
   }
@@ -410,16 +466,22 @@ Result<OdometryCalibration> CalibrateOdometry(const OdometryRecording& recording
   calibration.has_turn_noise = extent.turn_rad > kLeastTurnRad;
   if (calibration.has_turn_noise) search.levels.push_back(kTurnSigma);
   const DriveFit fit = Calibrate(filter, search, fixed, calibration);
-  calibration.has_lateral_noise =
-      calibration.noise.lateral_sigma_m_per_sqrt_m > 3.0 * kLateralSigma.low;
-  calibration.has_turn_noise = calibration.has_turn_noise &&
-                               calibration.noise.turn_sigma_rad_per_sqrt_rad > 3.0 * kTurnSigma.low;
+  calibration.has_wheel_noise = IsMeasured(calibration.noise, kWheelSigma);
+  calibration.has_lateral_noise = IsMeasured(calibration.noise, kLateralSigma);
+  calibration.has_turn_noise =
+      calibration.has_turn_noise && IsMeasured(calibration.noise, kTurnSigma);
   calibration.references = fit.references + selection.disagreeing;
   calibration.outliers = fit.outliers + selection.disagreeing;
   calibration.residual_rms =
       std::sqrt(fit.residuals.squaredNorm() / static_cast<double>(fit.residuals.size()));
   CalibrateSensors(recording, filter.references(), fixed, calibration);
-  if (recording.has_front) CalibrateFront(recording, calibration);
+  if (recording.has_front) {
+    const double offset_s = calibration.drive.time_offset_s;
+    CalibrateFront(recording,
+                   filter.references().front().time_s + offset_s,
+                   filter.references().back().time_s + offset_s,
+                   calibration);
+  }
   return calibration;
 }
 
@@ -446,11 +508,16 @@ OdometryConfig ApplyCalibration(const OdometryConfig& config,
     applied.drive.right_scale *= drive.right_scale;
   }
   applied.drive.track_m = drive.track_m;
-  applied.drive.wheel_sigma_m_per_sqrt_m = calibration.noise.wheel_sigma_m_per_sqrt_m;
+  if (calibration.has_wheel_noise)
+    applied.drive.wheel_sigma_m_per_sqrt_m = calibration.noise.wheel_sigma_m_per_sqrt_m;
   if (calibration.has_lateral_noise)
     applied.drive.lateral_sigma_m_per_sqrt_m = calibration.noise.lateral_sigma_m_per_sqrt_m;
   if (calibration.has_turn_noise)
     applied.drive.turn_sigma_rad_per_sqrt_rad = calibration.noise.turn_sigma_rad_per_sqrt_rad;
+  if (calibration.has_yaw_rate_noise)
+    applied.yaw_rate.noise_rad_per_sqrt_s = calibration.noise.yaw_rate_noise_rad_per_sqrt_s;
+  if (calibration.has_steering_noise)
+    applied.steering.sigma_rad = calibration.noise.steering_sigma_rad;
   applied.steering.ratio = drive.steering_ratio;
   applied.steering.offset_rad = drive.steering_offset_rad;
   applied.yaw_rate.scale = drive.yaw_rate_scale;
@@ -459,12 +526,8 @@ OdometryConfig ApplyCalibration(const OdometryConfig& config,
     if (!parameter.is_known) continue;
     if (parameter.name == "front_left_scale") applied.drive.front_left_scale *= parameter.after;
     if (parameter.name == "front_right_scale") applied.drive.front_right_scale *= parameter.after;
-    if (parameter.name == "yaw_rate_bias") {
+    if (parameter.name == "yaw_rate_bias")
       applied.yaw_rate.bias_sigma_radps = std::max(parameter.sigma, 1e-5);
-      applied.yaw_rate.noise_rad_per_sqrt_s = calibration.noise.yaw_rate_noise_rad_per_sqrt_s;
-    }
-    if (parameter.name == "steering_offset")
-      applied.steering.sigma_rad = calibration.noise.steering_sigma_rad;
   }
   return applied;
 }

@@ -34,8 +34,12 @@ struct OdometryCalibration {
   std::vector<CalibratedParameter> parameters;
   DriveParameters drive;
   DriveNoise noise;
-  bool has_turn_noise = false;     ///< Whether the drive turns enough to measure it.
-  bool has_lateral_noise = false;  ///< Whether there is more of it than the reference hides.
+  // Whether there is more of a noise than the reference's hides, and the drive shows it.
+  bool has_wheel_noise = false;
+  bool has_turn_noise = false;
+  bool has_lateral_noise = false;
+  bool has_yaw_rate_noise = false;
+  bool has_steering_noise = false;
   int references = 0;
   int outliers = 0;
   double residual_rms = 0.0;  ///< Of the whitened innovations: 1 if the noise is right.

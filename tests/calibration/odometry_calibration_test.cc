@@ -268,6 +268,50 @@ TEST(OdometryCalibrationTest, JudgesByWhereTheBodyWas) {
   EXPECT_LT(std::sqrt(squared_m2 / static_cast<double>(bodies.size())), 0.05);
 }
 
+/// Without noise of its own the yaw rate is not given one of nothing, which would be believed.
+TEST(OdometryCalibrationTest, KeepsANoiseThatTheReferenceHides) {
+  const Car car = MakeCar();
+  Recorded recorded = Record(car, Drive(false), 5);
+  for (std::size_t i = 0; i < recorded.recording.samples.size(); ++i) {
+    auto& sample = recorded.recording.samples[i];
+    const auto time_ns = recorded.recording.origin_ns + std::llround(1e9 * sample.time_s);
+    const auto X_WB = Interpolate(Drive(false), time_ns, 1'000'000'000);
+    if (X_WB) sample.yaw_rad = X_WB->yaw();
+  }
+  const auto calibration =
+      CalibrateOdometry(recorded.recording, recorded.references, car.config, {});
+  ASSERT_TRUE(calibration) << calibration.error().message;
+  EXPECT_FALSE(calibration->has_yaw_rate_noise);
+  EXPECT_TRUE(calibration->has_wheel_noise);
+  const OdometryConfig applied = ApplyCalibration(car.config, *calibration);
+  EXPECT_EQ(applied.yaw_rate.noise_rad_per_sqrt_s, car.config.yaw_rate.noise_rad_per_sqrt_s);
+  EXPECT_NE(applied.drive.wheel_sigma_m_per_sqrt_m, car.config.drive.wheel_sigma_m_per_sqrt_m);
+}
+
+/// The front wheels are as large as where the reference is; what they do elsewhere, slipping, or in
+/// a few odd seconds says nothing.
+TEST(OdometryCalibrationTest, FindsTheFrontWheelsWhereTheReferenceIs) {
+  const Car car = MakeCar();
+  Recorded recorded = Record(car, Drive(false), 5);
+  std::erase_if(recorded.references, [](const auto& pose) { return pose.time_s > 60.0; });
+  OdometryRecording& recording = recorded.recording;
+  double added_m = 0.0;
+  for (std::size_t i = 1; i < recording.samples.size(); ++i) {
+    auto& sample = recording.samples[i];
+    const bool is_odd = sample.time_s > 65.0 || (sample.time_s > 10.0 && sample.time_s < 12.0);
+    sample.is_slipping = sample.time_s > 20.0 && sample.time_s < 25.0;
+    if (is_odd || sample.is_slipping) added_m += 0.02;
+    sample.travel_m[2] = sample.travel_m[2] / 1.004 + added_m;
+    sample.travel_m[3] = sample.travel_m[3] / 1.001 + added_m;
+  }
+  const auto calibration = CalibrateOdometry(recording, recorded.references, car.config, {});
+  ASSERT_TRUE(calibration) << calibration.error().message;
+  const double left = Find(*calibration, "front_left_scale").after;
+  const double right = Find(*calibration, "front_right_scale").after;
+  EXPECT_NEAR(left, 1.004, 0.002);
+  EXPECT_NEAR(left - right, 0.003, 0.0005);
+}
+
 TEST(OdometryCalibrationTest, NeedsNoHeadingsOfTheReference) {
   const Car car = MakeCar();
   Recorded recorded = Record(car, Drive(false), 6);

@@ -15,12 +15,14 @@
 namespace relocd {
 namespace {
 
+class RecordedCalibrationTest : public testing::TestWithParam<const char*> {};
+
 /// A minute of a real car: calibrated on its first half, judged on its second.
-TEST(RecordedCalibrationTest, KeepsTheSecondHalfOfARealDrive) {
+TEST_P(RecordedCalibrationTest, KeepsTheSecondHalfOfARealDrive) {
   const std::string data = SharedData("comma_can");
   if (data.empty()) GTEST_SKIP() << SharedDataReason("comma_can");
   const std::string vehicle = std::string(RELOCD_SOURCE_DIR) + "/config/vehicles/toyota_rav4.yaml";
-  const Config config = LoadConfig(vehicle, {}).value();
+  const Config config = LoadConfig(vehicle, {std::string("odometry.model=") + GetParam()}).value();
   const DbcFile dbc = DbcFile::Read(config.can.dbc_file).value();
   const auto record = [&](const OdometryConfig& odometry) {
     return RecordOdometry(data + "/can0_vehicle_bus.log",
@@ -56,6 +58,10 @@ TEST(RecordedCalibrationTest, KeepsTheSecondHalfOfARealDrive) {
   EXPECT_LT(std::abs(heading_deg), 1.5);
   EXPECT_LT(judgement.position_error_m, 6.0);
 }
+
+INSTANTIATE_TEST_SUITE_P(Models,
+                         RecordedCalibrationTest,
+                         testing::Values("differential", "four_wheel"));
 
 }  // namespace
 }  // namespace relocd
