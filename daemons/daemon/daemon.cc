@@ -72,6 +72,7 @@ class Frame {
   /// A daemon that only publishes is not woken by the messages of all others, its own included.
   static Result<void> Follow(LcmBus* bus, EventLoop& loop) {
     if (bus == nullptr || !bus->is_listening()) return {};
+    if (auto ok = bus->CheckListening(); !ok) return ok;
     return loop.OnReadable(bus->fd(), [bus] { bus->HandlePending(); });
   }
 
@@ -163,7 +164,9 @@ int RunDaemon(int argc,
 }
 
 void LogLine(int priority, const std::string& daemon, const std::string& text) {
-  fmt::print(stderr, "<{}>{}: {}\n", priority, daemon, text);
+  // Not fmt::print, which throws where nobody takes the log: a full disk must not end a daemon.
+  const std::string line = fmt::format("<{}>{}: {}\n", priority, daemon, text);
+  static_cast<void>(std::fwrite(line.data(), 1, line.size(), stderr));
 }
 
 std::int64_t RandomRunId() {

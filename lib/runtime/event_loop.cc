@@ -28,6 +28,7 @@ Result<EventLoop> EventLoop::Create() {
   ::sigaddset(&mask, SIGINT);
   ::sigaddset(&mask, SIGTERM);
   if (::pthread_sigmask(SIG_BLOCK, &mask, nullptr) != 0) return SystemError("blocking signals");
+  if (::signal(SIGPIPE, SIG_IGN) == SIG_ERR) return SystemError("ignoring SIGPIPE");
 
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
   if (!epoll.valid()) return SystemError("creating an epoll instance");

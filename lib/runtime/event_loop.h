@@ -18,7 +18,8 @@ class EventLoop {
   using Handler = std::function<void()>;
 
   /// Blocks SIGINT and SIGTERM for this thread and those it starts later, so that they end Run
-  /// rather than the process. Call it before starting any thread.
+  /// rather than the process, and ignores SIGPIPE: a log that nobody reads any more must not end it
+  /// either. Call it before starting any thread.
   static Result<EventLoop> Create();
 
   /// Calls `handler` whenever `fd`, which stays the caller's, can be read.

@@ -1,5 +1,7 @@
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -13,6 +15,7 @@
 
 #include "core/file.h"
 #include "core/time.h"
+#include "core/unique_fd.h"
 #include "supervision/child_process.h"
 #include "supervision/notify_server.h"
 #include "support/temporary_folder.h"
@@ -53,11 +56,8 @@ class RelocdProcessTest : public testing::Test {
   }
 
   [[nodiscard]] std::string Command(const std::string& arguments) const {
-    return fmt::format("exec {} --config {}robot.yaml {} 2>>{}relocd.log",
-                       RELOCD_PROGRAM,
-                       directory_,
-                       arguments,
-                       directory_);
+    return fmt::format(
+        "exec {} --config {}robot.yaml {} 2>>{}", RELOCD_PROGRAM, directory_, arguments, log_);
   }
 
   void StartRelocd(const std::string& arguments = "") {
@@ -111,6 +111,7 @@ class RelocdProcessTest : public testing::Test {
 
   TemporaryFolder folder_;
   std::string directory_ = folder_.path() + "/";
+  std::string log_ = directory_ + "relocd.log";
   std::optional<NotifyServer> notify_;
   std::optional<ChildProcess> relocd_;
   bool is_ready_ = false;
@@ -177,6 +178,29 @@ TEST_F(RelocdProcessTest, RunsItsChildrenWithoutLcm) {
     return Text("relocd.log").find("<3>relocd: opening LCM at 'file:///nowhere/log.lcm?mode=w'") !=
            std::string::npos;
   });
+}
+
+TEST_F(RelocdProcessTest, RunsOnWhenItsLogTakesNothing) {
+  log_ = "/dev/full";
+  WriteConfig(ConfigText("ready, wait"));
+  StartRelocd();
+  WaitUntil([&] { return HasStatus("2/2 ready"); });
+}
+
+TEST_F(RelocdProcessTest, RunsOnWhenNobodyReadsItsLog) {
+  log_ = directory_ + "pipe";
+  ASSERT_EQ(::mkfifo(log_.c_str(), 0600), 0);
+  UniqueFd reader(::open(log_.c_str(), O_RDONLY | O_NONBLOCK));
+  WriteConfig(ConfigText("ready, wait"));
+  StartRelocd();
+  WaitUntil([&] { return HasStatus("2/2 ready"); });
+  reader = UniqueFd();
+  WriteConfig(ConfigText("status:new, ready, wait"));
+  relocd_->Signal(SIGHUP);  // is told in the log
+  WaitUntil([&] {
+    return Text("children.log") == "first start\nsecond start\nsecond term\nsecond start\n";
+  });
+  EXPECT_FALSE(relocd_->Reap());
 }
 
 TEST_F(RelocdProcessTest, RefusesASecondCopy) {
