@@ -32,8 +32,7 @@ void Listen(MessageBus& bus, MonotonicTime until) {
 /// Listens for a round, and for further ones until all is well or the time is over.
 ///
 /// @return whether all is well.
-bool Watch(MessageBus& bus, StatusReport& report, double wait_s) {
-  report.Subscribe(bus);
+bool Watch(MessageBus& bus, const StatusReport& report, double wait_s) {
   const MonotonicTime end = MonotonicClock::now() + FromSeconds(wait_s);
   while (true) {
     Listen(bus, MonotonicClock::now() + kListenFor);
@@ -69,6 +68,11 @@ int main(int argc, char** argv) {
     return relocd::ExitCode(bus.error());
   }
   relocd::StatusReport report;
+  report.Subscribe(**bus);
+  if (auto ok = (*bus)->CheckListening(); !ok) {
+    fmt::print(stderr, "reloc status: {}\n", ok.error().message);
+    return relocd::ExitCode(ok.error());
+  }
   const bool is_well = relocd::Watch(**bus, report, wait_s);
   const auto now = relocd::MonotonicClock::now();
   fmt::print("{}", json ? report.Json(now) : report.Text(now));

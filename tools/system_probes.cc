@@ -97,6 +97,7 @@ Result<void> ThisMachine::LoopBack(const std::string& lcm_url) {
   const std::string channel = fmt::format("DOCTOR_{}", ::getpid());
   bool is_back = false;
   (*bus)->SubscribeRaw(channel, [&](const auto& /*channel*/, auto /*bytes*/) { is_back = true; });
+  if (auto ok = (*bus)->CheckListening(); !ok) return ok;
   const std::array<std::uint8_t, 1> message{};
   if (auto ok = (*bus)->PublishBytes(channel, message); !ok) return ok;
   const MonotonicTime end = MonotonicClock::now() + kLoopBackTimeout;

@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 
-#include "core/check.h"
 #include "core/unique_fd.h"
 
 namespace relocd {
@@ -63,7 +62,7 @@ Result<std::unique_ptr<LcmBus>> LcmBus::Open(const std::string& url) {
                     "that can be opened",
                     url)};
   }
-  return std::unique_ptr<LcmBus>(new LcmBus(lcm));
+  return std::unique_ptr<LcmBus>(new LcmBus(lcm, url));
 }
 
 LcmBus::~LcmBus() {
@@ -85,8 +84,20 @@ Result<void> LcmBus::PublishBytes(const std::string& channel, std::span<const st
 void LcmBus::OnSubscribe(Subscription& subscription) {
   lcm_subscription_t* handle =
       ::lcm_subscribe(lcm_, subscription.pattern.c_str(), &LcmBus::OnMessage, &subscription);
-  RELOCD_CHECK(handle != nullptr, "channel names are literals, and valid as regular expressions");
+  if (handle == nullptr) {
+    is_deaf_ = true;
+    return;
+  }
   ::lcm_subscription_set_queue_capacity(handle, kQueueCapacity);
+}
+
+Result<void> LcmBus::CheckListening() const {
+  if (!is_deaf_) return {};
+  return Error{ErrorKind::kUnavailable,
+               fmt::format("listening at '{}': LCM cannot, and says why above: its port must not "
+                           "be another program's alone (ss -ulpn), and no firewall may keep "
+                           "multicast from lo",
+                           url_)};
 }
 
 void LcmBus::OnMessage(const lcm_recv_buf_t* buffer, const char* channel, void* user) noexcept {

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <lcm/lcm.h>
 
@@ -31,15 +32,22 @@ class LcmBus final : public MessageBus {
   int HandlePending() override;
   [[nodiscard]] int fd() const override;
 
+  /// To be asked after subscribing: LCM begins to listen with the first subscription.
+  ///
+  /// @return kUnavailable when it could not.
+  [[nodiscard]] Result<void> CheckListening() const;
+
  protected:
   void OnSubscribe(Subscription& subscription) override;
 
  private:
-  explicit LcmBus(lcm_t* lcm) : lcm_(lcm) {}
+  LcmBus(lcm_t* lcm, std::string url) : lcm_(lcm), url_(std::move(url)) {}
 
   static void OnMessage(const lcm_recv_buf_t* buffer, const char* channel, void* user) noexcept;
 
   lcm_t* lcm_;
+  std::string url_;
+  bool is_deaf_ = false;  ///< LCM refused a subscription.
 };
 
 }  // namespace relocd

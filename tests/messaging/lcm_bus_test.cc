@@ -1,11 +1,17 @@
 #include "messaging/lcm_bus.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
 
+#include "core/unique_fd.h"
 #include "support/temporary_folder.h"
 
 namespace relocd {
@@ -29,6 +35,25 @@ TEST(LcmBusTest, RefusesAnAddressThatIsNone) {
   ASSERT_FALSE(bus);
   EXPECT_EQ(bus.error().kind, ErrorKind::kInvalidInput);
   EXPECT_THAT(bus.error().message, HasSubstr("'robot' is no IPv4 address"));
+}
+
+TEST(LcmBusTest, SaysThatItCannotListenWhereAnotherProgramHasThePort) {
+  const UniqueFd other(::socket(AF_INET, SOCK_DGRAM, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  socklen_t size = sizeof(address);
+  ASSERT_EQ(::bind(other.get(), generic, size), 0);  // the kernel chooses a port
+  ASSERT_EQ(::getsockname(other.get(), generic, &size), 0);
+  const auto url = fmt::format("udpm://239.255.76.67:{}?ttl=0", ntohs(address.sin_port));
+  const auto bus = LcmBus::Open(url);
+  if (!bus) GTEST_SKIP() << bus.error().message;  // no route
+  EXPECT_TRUE((*bus)->CheckListening()) << "nothing is subscribed to";
+  (*bus)->SubscribeRaw("POSE", [](const auto& /*channel*/, auto /*bytes*/) {});
+  const auto listens = (*bus)->CheckListening();
+  ASSERT_FALSE(listens);
+  EXPECT_EQ(listens.error().kind, ErrorKind::kUnavailable);
+  EXPECT_THAT(listens.error().message, HasSubstr("listening at '" + url + "': LCM cannot"));
 }
 
 TEST(LcmBusTest, RefusesAProviderThatIsNone) {
