@@ -4,6 +4,7 @@
 #include <ctime>
 #include <filesystem>
 #include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -22,20 +23,29 @@ constexpr std::string_view kSuffix = ".lcmlog";
 struct Segment {
   fs::path path;
   std::int64_t size_bytes = 0;
+  std::string number{};  ///< `<run>-<number>` of this run's files; empty for those of others.
 };
 
-/// Our own files in the folder, the oldest first.
-std::vector<Segment> Segments(const std::string& directory) {
+/// recorderd's files in the folder, the oldest first. This run's are the newest whatever their
+/// dates say: the clock of a robot without network may begin in the past.
+std::vector<Segment> Segments(const std::string& directory, const std::string& run) {
   std::vector<Segment> segments;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(directory, error)) {
     const std::string name = entry.path().filename().string();
     if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
     const auto size = entry.file_size(error);
-    if (!error) segments.push_back({entry.path(), static_cast<std::int64_t>(size)});
+    if (error) continue;
+    const auto number = name.rfind("-" + run + "-");
+    segments.push_back({.path = entry.path(),
+                        .size_bytes = static_cast<std::int64_t>(size),
+                        .number = number == std::string::npos ? "" : name.substr(number)});
   }
   std::sort(segments.begin(), segments.end(), [](const Segment& a, const Segment& b) {
-    return a.path < b.path;
+    const auto order = [](const Segment& segment) {  // 10000 is longer, and later, than 9999
+      return std::make_tuple(segment.number.size(), segment.number, segment.path);
+    };
+    return order(a) < order(b);
   });
   return segments;
 }
@@ -136,7 +146,7 @@ void SegmentWriter::Drop(std::int64_t events, const Error& error) {
 }
 
 void SegmentWriter::DeleteOldest() {
-  std::vector<Segment> segments = Segments(config_.directory);
+  std::vector<Segment> segments = Segments(config_.directory, run_);
   std::int64_t total = 0;
   for (const Segment& segment : segments)
     total += segment.size_bytes;

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/file.h"
 #include "recording/log_reader.h"
 #include "support/temporary_folder.h"
 
@@ -78,6 +79,19 @@ TEST_F(SegmentWriterTest, DeletesTheOldestAboveItsQuota) {
     total += fs::file_size(file);
   EXPECT_LE(total, 4'200'000U);
   EXPECT_EQ(writer.counters().dropped, 0);
+}
+
+TEST_F(SegmentWriterTest, KeepsItsQuotaAndItsOwnFilesWhenTheClockIsInThePast) {
+  fs::create_directories(config_.directory);
+  const std::string other_run = config_.directory + "/relocd-20260101-000000-ffff-0000.lcmlog";
+  ASSERT_TRUE(WriteFile(other_run, std::string(3'500'000, '\0')));
+  SegmentWriter writer(config_, "0a1b");
+  ASSERT_TRUE(writer.Open());
+  for (int i = 0; i < 25; ++i)
+    writer.Append(i, "IMAGE_front", hundred_kilobytes_);  // in 1970
+  writer.Flush();
+  EXPECT_FALSE(fs::exists(other_run));
+  EXPECT_EQ(Files().size(), 3U);
 }
 
 TEST_F(SegmentWriterTest, DeletesTheOldestWhenOthersFillTheDisk) {
