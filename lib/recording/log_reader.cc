@@ -22,6 +22,10 @@ constexpr std::size_t kSyncSize = 4;
 Result<LogReader> LogReader::Open(const std::string& path) {
   UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!fd.valid()) return SystemError(ErrorKind::kUnavailable, fmt::format("opening log {}", path));
+  // Nothing is read, but what cannot be, as a folder, says so.
+  if (::read(fd.get(), nullptr, 0) != 0) {
+    return SystemError(ErrorKind::kUnavailable, fmt::format("reading log {}", path));
+  }
   return LogReader(std::move(fd));
 }
 

@@ -121,5 +121,11 @@ TEST_F(LogTest, NamesALogThatIsNotThere) {
   EXPECT_THAT(reader.error().message, HasSubstr("/nonexistent/x.lcmlog"));
 }
 
+TEST_F(LogTest, AFolderIsNoEmptyLog) {
+  const auto reader = LogReader::Open("/");
+  ASSERT_FALSE(reader);
+  EXPECT_EQ(reader.error().message, "reading log /: Is a directory");
+}
+
 }  // namespace
 }  // namespace relocd
