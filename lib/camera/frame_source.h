@@ -92,8 +92,8 @@ class FrameSource {
   /// What is otherwise than the config asks, although frames come; empty when nothing is.
   [[nodiscard]] const std::string& remark() const { return remark_; }
 
-  /// What an operator should read of since the last call: a camera lost or found, a file that is
-  /// damaged. Each change once, not each event.
+  /// What an operator should read of since the last call, besides the problem: a camera found
+  /// again, a file that is damaged. Each change once, not each event.
   std::vector<std::string> TakeNotices() { return std::exchange(notices_, {}); }
 
  protected:

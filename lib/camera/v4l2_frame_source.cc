@@ -89,9 +89,7 @@ void V4l2FrameSource::Lose(const std::string& why, MonotonicTime now) {
   wake_up_ = now + kReopenPeriod;
   gap_ = gap_ || counters_.delivered > 0;
   if (!lost_since_) lost_since_ = now;
-  if (problem_ == why) return;
   problem_ = why;
-  notices_.push_back("no frames: " + why);
 }
 
 void V4l2FrameSource::Recover(const std::string& why, MonotonicTime now) {
@@ -224,7 +222,7 @@ void V4l2FrameSource::NoteDelivery(MonotonicTime now) {
                                    FrameRateText(format, config_.frame_rate_hz));
   if (lost_since_) {
     ++counters_.reopened;
-    notice += fmt::format(", back after {:.1f} s", ToSeconds(now - *lost_since_));
+    notice += fmt::format(", back after {:.1f} s ({})", ToSeconds(now - *lost_since_), problem_);
   }
   notices_.push_back(std::move(notice));
   lost_since_.reset();
