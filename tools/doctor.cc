@@ -239,10 +239,15 @@ Finding CheckCan(const Config& config, SystemProbes& probes) {
   }
   const auto restart = std::ranges::find(words, "restart-ms");
   if (restart == words.end() || std::next(restart) == words.end() || *std::next(restart) == "0") {
-    return Problem(
-        name,
-        interface + " has restart-ms 0: it stays off the bus after a bus-off",
-        fmt::format("sudo ip link set {0} down && sudo ip link set {0} up {1}", interface, type));
+    // Where an operator was told by systemd-networkd that the adapter cannot: docs/operations.md.
+    if (probes.Read(fmt::format("/etc/systemd/network/80-{}.network.d/no-restart.conf", interface)))
+      return Ok(name, interface + " is up, restart-ms 0 as no-restart.conf has it");
+    // An adapter that refuses is up again all the same, and each keeps its bit rate.
+    return Problem(name,
+                   interface + " has restart-ms 0: it stays off the bus after a bus-off",
+                   fmt::format("sudo ip link set {0} down; sudo ip link set {0} type can "
+                               "restart-ms 100; sudo ip link set {0} up",
+                               interface));
   }
   return Ok(name, fmt::format("{} is up, restart-ms {}", interface, *std::next(restart)));
 }

@@ -178,7 +178,17 @@ TEST_F(DoctorTest, AControllerThatStaysOffTheBusIsSaid) {
        {"can state ERROR-ACTIVE restart-ms 0", "can state ERROR-ACTIVE"}) {
     machine_.outputs["ip -details link show can0"] = details;
     EXPECT_THAT(Only("can").found, HasSubstr("restart-ms 0")) << details;
+    EXPECT_EQ(Only("can").command,
+              "sudo ip link set can0 down; sudo ip link set can0 type can restart-ms 100; "
+              "sudo ip link set can0 up");
   }
+}
+
+TEST_F(DoctorTest, AnAdapterThatCannotRestartIsLeftAlone) {
+  machine_.outputs["ip -details link show can0"] = "can state ERROR-ACTIVE restart-ms 0";
+  machine_.files["/etc/systemd/network/80-can0.network.d/no-restart.conf"] =
+      "[CAN]\nRestartSec=0\n";
+  EXPECT_TRUE(Only("can").is_ok);
 }
 
 TEST_F(DoctorTest, AServiceUserWhoMayNotOpenCamerasIsSaid) {
