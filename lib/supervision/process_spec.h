@@ -68,7 +68,10 @@ struct SupervisionConfig {
   double backoff_max_s = 5.0;
   double backoff_reset_s = 30.0;
 
-  ProcessConfig recorderd{.start_timeout_s = 3.0, .stop_timeout_s = 5.0, .stop_tier = 2};
+  /// A disk may take seconds for a write, as an SD card that tidies up: to end recorderd for that
+  /// would lose what it waits to write.
+  ProcessConfig recorderd{
+      .watchdog_s = 10.0, .start_timeout_s = 3.0, .stop_timeout_s = 5.0, .stop_tier = 2};
   ProcessConfig smootherd{
       .after = {"recorderd"}, .stop_tier = 1, .scheduling = "fifo", .priority = 10};
   ProcessConfig inferenced{.after = {"recorderd"}, .watchdog_s = 10.0, .stop_tier = 1, .nice = 5};

@@ -231,10 +231,11 @@ def daemons_killed():
 
 def daemons_hang():
     _drive_wheels()
-    _disturb_each(signal.SIGSTOP, {"recorderd": 3.7, "smootherd": 3.7, "odometryd": 3.7, "camerad_front": 3.7}, "stopped")
+    _disturb_each(signal.SIGSTOP, {"recorderd": 11.7, "smootherd": 3.7, "odometryd": 3.7, "camerad_front": 3.7}, "stopped")
     hung = [line for line in journal().splitlines() if "no sign of life" in line]
     noticed_s = [float(line.split("life for ")[1].split(" s")[0]) for line in hung]
-    check(len(hung) == 4 and max(noticed_s) < 3.0, f"noticed after {noticed_s} s")
+    # The recorder first: it has 10 s, for a slow disk.
+    check(len(hung) == 4 and noticed_s[0] < 11.0 and max(noticed_s[1:]) < 3.0, f"noticed after {noticed_s} s")
 
 
 def daemons_killed_all_at_once():
