@@ -3,18 +3,21 @@
 #include <algorithm>
 #include <cstddef>
 #include <iterator>
+#include <numbers>
 #include <utility>
 
 #include "geometry/covariance.h"
 #include "map_disturbance.h"
 #include "map_evaluation.h"
+#include "relocalization/training_places.h"
 
 namespace relocd {
 namespace {
 
 /// A pose that is off by less is right.
 constexpr double kRightM = 2.0;
-constexpr std::size_t kMirroredFrames = 200;
+/// Frames that are looked for by each region for wrong poses.
+constexpr std::size_t kWrongFrames = 200;
 
 /// The factor by which covariances must grow.
 double CovarianceFactor(const SceneMap& map, const std::vector<FrameLocalization>& localizations) {
@@ -28,18 +31,6 @@ double CovarianceFactor(const SceneMap& map, const std::vector<FrameLocalization
     ratios.push_back(SquaredMahalanobis(error, localization.pose.covariance) / kChiSquared90Dof6);
   }
   return ratios.empty() ? 1.0 : std::clamp(Quantile(ratios, kShare), 1.0, 1e6);
-}
-
-/// Well above what mirrored images reach, and well below what right poses have; where both are near
-/// to each other, above the mirrored ones, as long as hardly a right pose is refused.
-double ConfidenceThreshold(const std::vector<double>& right, const std::vector<double>& mirrored) {
-  constexpr double kLeast = 0.03;
-  constexpr double kRefusedShare = 0.01;
-  const double wrong =
-      mirrored.empty() ? kLeast : *std::max_element(mirrored.begin(), mirrored.end());
-  const double lowest_right = right.empty() ? 1.0 : Quantile(right, kRefusedShare);
-  const double between = std::max(1.1 * wrong, std::min(2.0 * wrong, 0.5 * lowest_right));
-  return std::clamp(std::min(between, lowest_right), kLeast, 1.0);
 }
 
 std::vector<FrameLocalization> OfRegion(const std::vector<FrameLocalization>& localizations,
@@ -64,48 +55,88 @@ std::vector<double> Confidences(const std::vector<FrameLocalization>& localizati
   return confidences;
 }
 
-/// The confidences of the poses that one region alone finds in mirrored images.
-Result<std::vector<double>> MirroredConfidences(const SceneMap& map,
-                                                std::size_t region,
-                                                const std::vector<DatasetFrame>& frames,
-                                                int threads) {
+/// The confidences of the poses that one region alone finds where there are none to find.
+Result<std::vector<double>> WrongConfidences(const SceneMap& map,
+                                             std::size_t region,
+                                             const std::vector<DatasetFrame>& frames,
+                                             int threads) {
   SceneMap alone = map;
   alone.regions = {map.regions[region]};
+  const auto foreign = LocalizeFrames(alone, FramesBeyondReach(map, region, frames), threads);
+  if (!foreign) return foreign.error();
   const auto mirror = [](const GrayImage& image, int /*index*/) { return Mirror(image); };
-  const auto found = LocalizeFrames(alone, frames, threads, mirror);
-  if (!found) return found.error();
-  return Confidences(*found);
+  const auto mirrored = LocalizeFrames(alone, frames, threads, mirror);
+  if (!mirrored) return mirrored.error();
+  std::vector<double> wrong = Confidences(*foreign);
+  const std::vector<double> of_mirrored = Confidences(*mirrored);
+  wrong.insert(wrong.end(), of_mirrored.begin(), of_mirrored.end());
+  return wrong;
 }
 
-std::vector<DatasetFrame> EvenlySpaced(const std::vector<DatasetFrame>& frames, std::size_t count) {
+std::vector<DatasetFrame> HeldOut(const std::vector<RouteFrame>& route) {
+  std::vector<DatasetFrame> frames;
+  for (const RouteFrame& frame : route) {
+    if (frame.is_held_out) frames.push_back(frame.frame);
+  }
+  return frames;
+}
+
+std::vector<DatasetFrame> EvenlySpaced(const std::vector<RouteFrame>& route, std::size_t count) {
   std::vector<DatasetFrame> chosen;
-  const std::size_t size = std::min(count, frames.size());
+  const std::size_t size = std::min(count, route.size());
   for (std::size_t index = 0; index < size; ++index)
-    chosen.push_back(frames[index * frames.size() / size]);
+    chosen.push_back(route[index * route.size() / size].frame);
   return chosen;
 }
 
 }  // namespace
 
-Result<void> CalibrateRegions(const std::vector<DatasetFrame>& held_out,
-                              int threads,
-                              SceneMap& map) {
+double ConfidenceThreshold(const std::vector<double>& right, const std::vector<double>& wrong) {
+  constexpr double kLeast = 0.03;
+  constexpr double kRefusedShare = 0.01;
+  // Streets that the map has never seen reach up to 2.5 times what mirrored frames of a short one
+  // do.
+  constexpr double kUnseenFactor = 3.0;
+  const double highest_wrong =
+      wrong.empty() ? kLeast : *std::max_element(wrong.begin(), wrong.end());
+  const double lowest_right = right.empty() ? 1.0 : Quantile(right, kRefusedShare);
+  const double between =
+      std::max(1.1 * highest_wrong, std::min(kUnseenFactor * highest_wrong, 0.5 * lowest_right));
+  return std::clamp(std::min(between, lowest_right), kLeast, 1.0);
+}
+
+std::vector<DatasetFrame> FramesBeyondReach(const SceneMap& map,
+                                            std::size_t region,
+                                            const std::vector<DatasetFrame>& frames) {
+  constexpr double kReachM = 50.0;
+  const Pose3 X_WD(map.R_WD, Eigen::Vector3d::Zero());
+  std::vector<DatasetFrame> beyond;
+  std::copy_if(
+      frames.begin(), frames.end(), std::back_inserter(beyond), [&](const DatasetFrame& frame) {
+        const NearestPlace nearest =
+            FindNearestPlace(map.regions[region], X_WD * frame.X_WC, std::numbers::pi);
+        return nearest.distance_m > kReachM;
+      });
+  return beyond;
+}
+
+Result<void> CalibrateRegions(const std::vector<RouteFrame>& route, int threads, SceneMap& map) {
   for (MapRegion& region : map.regions)
     region.calibration = {};  // covariances as they come, and no pose refused
-  const auto raw = LocalizeFrames(map, held_out, threads);
-  if (!raw) return raw.error();
-  const std::vector<DatasetFrame> foreign = EvenlySpaced(held_out, kMirroredFrames);
+  const auto held_out = LocalizeFrames(map, HeldOut(route), threads);
+  if (!held_out) return held_out.error();
+  const std::vector<DatasetFrame> sample = EvenlySpaced(route, kWrongFrames);
   std::vector<RegionCalibration> calibrations(map.regions.size());
   for (std::size_t region = 0; region < map.regions.size(); ++region) {
-    std::vector<FrameLocalization> localizations = OfRegion(*raw, region);
-    const auto mirrored = MirroredConfidences(map, region, foreign, threads);
-    if (!mirrored) return mirrored.error();
+    std::vector<FrameLocalization> localizations = OfRegion(*held_out, region);
+    const auto wrong = WrongConfidences(map, region, sample, threads);
+    if (!wrong) return wrong.error();
     calibrations[region].covariance_factor = CovarianceFactor(map, localizations);
     std::erase_if(localizations, [&map](const FrameLocalization& localization) {
       return PoseError(map, localization).head<3>().norm() > kRightM;
     });
     calibrations[region].confidence_threshold =
-        ConfidenceThreshold(Confidences(localizations), *mirrored);
+        ConfidenceThreshold(Confidences(localizations), *wrong);
   }
   for (std::size_t region = 0; region < map.regions.size(); ++region)
     map.regions[region].calibration = calibrations[region];

@@ -474,7 +474,7 @@ Result<TrainedMap> TrainMap(const std::vector<SelectedFrames>& drives,
     if (frame.is_held_out) held_out.push_back(frame.frame);
   }
 
-  if (auto calibrated = CalibrateRegions(held_out, options.threads, map); !calibrated) {
+  if (auto calibrated = CalibrateRegions(*route, options.threads, map); !calibrated) {
     return std::move(calibrated).error();
   }
   auto localizations = LocalizeFrames(map, held_out, options.threads);

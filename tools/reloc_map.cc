@@ -256,7 +256,7 @@ Result<int> Calibrate(const CalibrateCommand& command) {
   for (const RouteFrame& frame : *route) {
     if (frame.is_held_out) held_out.push_back(frame.frame);
   }
-  if (auto done = CalibrateRegions(held_out, command.threads, *map); !done) return done.error();
+  if (auto done = CalibrateRegions(*route, command.threads, *map); !done) return done.error();
   const auto localizations = LocalizeFrames(*map, held_out, command.threads);
   if (!localizations) return localizations.error();
   if (auto written = WriteMap(*map, command.out); !written) return written.error();
