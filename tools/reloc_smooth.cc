@@ -38,16 +38,30 @@ Result<SmootherConfig> ReadConfig(const Options& options) {
   return config.localization.smoother;
 }
 
-void ReportCamera(const CameraOffset& camera) {
-  if (!camera.IsSought()) return;
+void ReportOdometry(const SystematicErrors& errors) {
+  if (OdometryPart(errors.prior_sigmas).isZero()) return;
+  const SystematicVector sigmas = errors.Sigmas();
+  fmt::print(stderr,
+             "odometry: misses {:.3f} +- {:.3f} % of the way, {:.3f} +- {:.3f} mrad of the turn on "
+             "each metre and {:.3f} +- {:.3f} mrad in each second\n",
+             100.0 * errors.odometry_scale(),
+             100.0 * sigmas[2],
+             1e3 * errors.odometry_rad_per_m(),
+             1e3 * sigmas[3],
+             1e3 * errors.odometry_rad_per_s(),
+             1e3 * sigmas[4]);
+}
+
+void ReportCamera(const SystematicErrors& errors) {
+  if (!errors.IsCameraSought()) return;
   constexpr double kDegrees = 180.0 / std::numbers::pi;
-  const Eigen::Vector2d sigmas = camera.covariance.diagonal().cwiseSqrt();
+  const Eigen::Vector2d sigmas = CameraPart(errors.Sigmas());
   fmt::print(stderr,
              "camera: looks {:.3f} +- {:.3f} deg farther to the left than believed, its times are "
              "{:.4f} +- {:.4f} s late\n",
-             kDegrees * camera.estimate.x(),
+             kDegrees * errors.camera_yaw_rad(),
              kDegrees * sigmas.x(),
-             camera.estimate.y(),
+             errors.camera_time_s(),
              sigmas.y());
 }
 
@@ -66,11 +80,12 @@ Result<void> Run(const Options& options) {
   if (!config) return config.error();
   const auto log = ReadMotionLog(options.odometry, options.fixes, *config);
   if (!log) return log.error();
-  CameraOffset camera;
+  SystematicErrors errors;
   const std::vector<SmootherEstimate> estimates =
-      options.smoothed ? SmoothAll(*log, *config, &camera) : SmoothCausally(*log, *config, &camera);
+      options.smoothed ? SmoothAll(*log, *config, &errors) : SmoothCausally(*log, *config, &errors);
   Report(*log, estimates);
-  ReportCamera(camera);
+  ReportOdometry(errors);
+  ReportCamera(errors);
   const std::string text = FormatEstimatesCsv(estimates);
   if (options.out.empty()) {
     fmt::print("{}", text);

@@ -477,15 +477,15 @@ void SmootherNode::AddFigures(const SmootherEstimate& estimate, NodeStatus& stat
   status.Add("odometry_to_pose_p99_ms", pose_latency_ms_.Percentile(0.99));
   status.Add("fix_p50_ms", fix_latency_ms_.Percentile(0.5));
   status.Add("fix_p99_ms", fix_latency_ms_.Percentile(0.99));
-  status.Add("odometry_drift_rad_per_m", smoother_.drift().rad_per_m());
-  status.Add("odometry_yaw_rate_bias_rad_per_s", smoother_.drift().rad_per_s());
-  status.Add("odometry_scale", smoother_.drift().scale());
-  const CameraOffset& camera = smoother_.camera();
-  if (camera.IsSought()) {
-    status.Add("camera_yaw_rad", camera.estimate.x());
-    status.Add("camera_yaw_sigma_rad", std::sqrt(camera.covariance(0, 0)));
-    status.Add("camera_time_s", camera.estimate.y());
-    status.Add("camera_time_sigma_s", std::sqrt(camera.covariance(1, 1)));
+  const SystematicErrors& errors = smoother_.systematic_errors();
+  status.Add("odometry_drift_rad_per_m", errors.odometry_rad_per_m());
+  status.Add("odometry_yaw_rate_bias_rad_per_s", errors.odometry_rad_per_s());
+  status.Add("odometry_scale", errors.odometry_scale());
+  if (errors.IsCameraSought()) {
+    status.Add("camera_yaw_rad", errors.camera_yaw_rad());
+    status.Add("camera_yaw_sigma_rad", errors.Sigmas()[0]);
+    status.Add("camera_time_s", errors.camera_time_s());
+    status.Add("camera_time_sigma_s", errors.Sigmas()[1]);
   }
   status.Add("fix_misfit", smoother_.weighting().misfit());
   status.Add("time_since_fix_s", estimate.time_since_fix_s.value_or(-1.0));

@@ -23,26 +23,35 @@ namespace {
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMajor3By2 = Eigen::Matrix<double, 3, 2, Eigen::RowMajor>;
 
-/// A relative pose's residual, as Ceres wants it: with unit variances.
-class MotionCost final : public ceres::SizedCostFunction<3, 3, 3> {
+/// A relative pose's residual, as Ceres wants it: with unit variances. The third parameter is what
+/// the odometry gets wrong.
+class MotionCost final : public ceres::SizedCostFunction<3, 3, 3, 3> {
  public:
-  explicit MotionCost(const RelativePoseResidual& residual)
-      : residual_(residual), weight_(residual.covariance().inverse().llt().matrixU()) {}
+  /// @param errors  with which the keyframe's motion has been put right.
+  MotionCost(const Keyframe& keyframe, Eigen::Vector3d errors)
+      : residual_(keyframe.MotionResidual()),
+        weight_(residual_.covariance().inverse().llt().matrixU()),
+        errors_(std::move(errors)),
+        by_errors_(MotionByOdometryErrors(keyframe.X_PK, keyframe.extent_PK)) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const auto at = residual_.Linearize(Eigen::Map<const Eigen::Vector3d>(x[0]),
                                         Eigen::Map<const Eigen::Vector3d>(x[1]));
+    const Eigen::Vector3d change = Eigen::Map<const Eigen::Vector3d>(x[2]) - errors_;
     Eigen::Map<Eigen::Vector3d> weighted(residual);
-    weighted = weight_ * at.error;
+    weighted = weight_ * (at.error - by_errors_ * change);
     if (jacobians == nullptr) return true;
     if (jacobians[0] != nullptr) Eigen::Map<RowMajor3>{jacobians[0]} = weight_ * at.by_A;
     if (jacobians[1] != nullptr) Eigen::Map<RowMajor3>{jacobians[1]} = weight_ * at.by_B;
+    if (jacobians[2] != nullptr) Eigen::Map<RowMajor3>{jacobians[2]} = -weight_ * by_errors_;
     return true;
   }
 
  private:
   RelativePoseResidual residual_;
   Eigen::Matrix3d weight_;
+  Eigen::Vector3d errors_;
+  ByOdometry by_errors_;
 };
 
 /// A root of an information matrix. Not a Cholesky factor: without a heading it is singular.
@@ -75,7 +84,7 @@ class FixCost final : public ceres::SizedCostFunction<3, 3> {
   Eigen::Matrix3d weight_;
 };
 
-/// That of a fix by a camera whose offset is estimated.
+/// That of a fix by a camera whose errors are estimated.
 class CameraFixCost final : public ceres::SizedCostFunction<3, 3, 2> {
  public:
   /// Borrows `fix`, which must outlive it.
@@ -101,13 +110,13 @@ class CameraFixCost final : public ceres::SizedCostFunction<3, 3, 2> {
   Eigen::Matrix3d weight_;
 };
 
-/// Holds what is not to be estimated where it is.
-constexpr double kHeldSigma = 1e-9;
-
-ceres::CostFunction* MakeCameraPrior(const CameraOffset& camera) {
-  const Eigen::Vector2d sigmas = camera.prior_sigmas.cwiseMax(kHeldSigma);
-  return new ceres::NormalPrior(sigmas.cwiseInverse().asDiagonal().toDenseMatrix(),
-                                Eigen::Vector2d::Zero());
+/// A prior about zero.
+template <typename Sigmas>
+ceres::CostFunction* MakeErrorPrior(const Sigmas& sigmas) {
+  constexpr double kHeldSigma = 1e-9;  // holds what is not to be estimated where it is
+  const Eigen::VectorXd held = sigmas.cwiseMax(kHeldSigma);
+  return new ceres::NormalPrior(held.cwiseInverse().asDiagonal().toDenseMatrix(),
+                                Eigen::VectorXd::Zero(held.size()));
 }
 
 ceres::Solver::Options SolverOptions(int max_iterations, double trust_region_radius) {
@@ -144,16 +153,26 @@ class WindowProblem {
                      : PlanarPose{.X_WB = oldest.X_WK(),
                                   .covariance = kUnknownSigmas.cwiseAbs2().asDiagonal()};
     AddFix(AbsolutePoseResidual::OfPose(prior.X_WB, Pose2(), prior.covariance), nullptr, oldest);
+    SystematicErrors& systematic = window.systematic;
+    double* const camera_errors = systematic.estimate.data();
+    double* const odometry_errors = systematic.estimate.data() + 2;
     for (std::size_t i = 1; i < window.keyframes.size(); ++i) {
-      problem_.AddResidualBlock(new MotionCost(window.keyframes[i].MotionResidual()),
+      const Keyframe& keyframe = window.keyframes[i];
+      problem_.AddResidualBlock(new MotionCost(keyframe, OdometryPart(systematic.estimate)),
                                 nullptr,
                                 window.keyframes[i - 1].x_WK.data(),
-                                window.keyframes[i].x_WK.data());
+                                window.keyframes[i].x_WK.data(),
+                                odometry_errors);
     }
-    const bool is_camera_sought = window.camera.IsSought();
+    problem_.AddResidualBlock(
+        MakeErrorPrior(OdometryPart(systematic.prior_sigmas)), nullptr, odometry_errors);
+    if (OdometryPart(systematic.prior_sigmas).isZero()) {
+      problem_.SetParameterBlockConstant(odometry_errors);
+    }
+    const bool is_camera_sought = systematic.IsCameraSought();
     if (is_camera_sought) {
       problem_.AddResidualBlock(
-          MakeCameraPrior(window.camera), nullptr, window.camera.estimate.data());
+          MakeErrorPrior(CameraPart(systematic.prior_sigmas)), nullptr, camera_errors);
     }
     losses_.reserve(window.fixes.size());
     for (const AttachedFix& fix : window.fixes) {
@@ -165,10 +184,8 @@ class WindowProblem {
         AddFix(fix.residual, losses_.back().get(), keyframe);
         continue;
       }
-      problem_.AddResidualBlock(new CameraFixCost(fix),
-                                losses_.back().get(),
-                                keyframe.x_WK.data(),
-                                window.camera.estimate.data());
+      problem_.AddResidualBlock(
+          new CameraFixCost(fix), losses_.back().get(), keyframe.x_WK.data(), camera_errors);
     }
   }
 
@@ -205,17 +222,17 @@ bool SolveBatch(KeyframeWindow& window, const FixWeighting& weighting, int max_i
   before.reserve(window.keyframes.size());
   for (const Keyframe& keyframe : window.keyframes)
     before.push_back(keyframe.x_WK);
-  const Eigen::Vector2d camera_before = window.camera.estimate;
+  const SystematicVector errors_before = window.systematic.estimate;
 
-  bool usable =
-      WindowProblem(window, weighting).Solve(max_iterations) && window.camera.estimate.allFinite();
-  const Eigen::Vector2d camera = std::exchange(window.camera.estimate, camera_before);
+  bool usable = WindowProblem(window, weighting).Solve(max_iterations) &&
+                window.systematic.estimate.allFinite();
+  const SystematicVector errors = std::exchange(window.systematic.estimate, errors_before);
   for (Keyframe& keyframe : window.keyframes) {
     usable = usable && keyframe.x_WK.allFinite();
     keyframe.x_WK.z() = WrapAngle(keyframe.x_WK.z());
   }
   if (usable) {
-    window.SetCameraOffset(camera);
+    window.SetSystematicErrors(errors);
     return true;
   }
   for (std::size_t i = 0; i < before.size(); ++i)

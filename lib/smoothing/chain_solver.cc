@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
@@ -26,10 +27,8 @@ constexpr double kSettledLength = 1e-4;
 constexpr double kSettledTurn = 1e-5;
 /// A step that turns a keyframe by more is looked at: has it lowered the cost?
 constexpr double kDoubtfulTurn = 0.1;
-/// A camera's offset that would move by a smaller part of its sigma is left, and all fixes with it.
-constexpr double kLeastOffset = 0.1;
-/// A keyframe that leaves takes this part of what is known of the offset with it: a camera that was
-/// knocked is seen within some thousand keyframes.
+/// A keyframe that leaves takes this part of what is known of the systematic errors with it: a
+/// camera that was knocked is seen within some thousand keyframes.
 constexpr double kForgotten = 5e-4;
 /// Information with which a damped step holds the estimates, of 1 m and 0.1 rad.
 const Eigen::Vector3d kDampingInformation(1.0, 1.0, 100.0);
@@ -57,54 +56,59 @@ Eigen::Matrix3d AlongMap(const Eigen::Matrix3d& covariance, double yaw) {
   return Symmetric(rotation * covariance * rotation.transpose());
 }
 
-/// The covariance of the camera's offset if fixes erred independently, also where a prior of 0 says
-/// that there is none.
-Eigen::Matrix2d CameraPosterior(const Eigen::Vector2d& prior_sigmas,
-                                const Eigen::Matrix2d& information) {
-  const Eigen::Matrix2d sigmas = prior_sigmas.asDiagonal();
-  return sigmas * (Eigen::Matrix2d::Identity() + sigmas * information * sigmas).inverse() * sigmas;
+/// The covariance of the systematic errors if fixes erred independently, also where a prior of 0
+/// says that there is none.
+SystematicMatrix SystematicPosterior(const SystematicVector& prior_sigmas,
+                                     const SystematicMatrix& information) {
+  const SystematicMatrix sigmas = prior_sigmas.asDiagonal();
+  const SystematicMatrix scaled = SystematicMatrix::Identity() + sigmas * information * sigmas;
+  return sigmas * scaled.ldlt().solve(sigmas);
 }
 
-Eigen::Matrix2d CameraCovariance(const Eigen::Matrix2d& posterior,
-                                 const CameraKnowledge& known,
-                                 const FixWeighting& weighting) {
+SystematicMatrix SystematicCovariance(const SystematicMatrix& posterior,
+                                      const SystematicKnowledge& known,
+                                      const FixWeighting& weighting) {
   return posterior + weighting.BiasVariance() * posterior * known.bias_covariance * posterior;
 }
 
 }  // namespace
 
-/// Leaves what is known of the camera to the window's next keyframe, but for a little.
-void ChainSolver::ForgetCamera(const CameraState& next, KeyframeWindow& window) {
+/// Leaves what is known of the systematic errors to the window's next keyframe, but for a little.
+void ChainSolver::ForgetSystematic(const SystematicState& next, KeyframeWindow& window) {
   constexpr double kKept = 1.0 - kForgotten;
-  window.prior->camera = {.by_camera = next.effect.by_camera,
-                          .bias_cross = kKept * next.effect.bias_cross};
-  window.camera.before_window = {.information = kKept * next.known.information,
-                                 .rhs = kKept * next.known.rhs,
-                                 .bias_covariance = kKept * kKept * next.known.bias_covariance,
-                                 .bias_cross = kKept * next.known.bias_cross};
+  window.prior->systematic = {.by_errors = next.effect.by_errors,
+                              .bias_cross = kKept * next.effect.bias_cross};
+  window.systematic.before_window = {.information = kKept * next.known.information,
+                                     .rhs = kKept * next.known.rhs,
+                                     .bias_covariance = kKept * kKept * next.known.bias_covariance,
+                                     .bias_cross = kKept * next.known.bias_cross};
 }
 
-ChainSolver::ChainSolver(std::size_t capacity) : nodes_(capacity), cameras_(capacity) {}
+ChainSolver::ChainSolver(std::size_t capacity) : nodes_(capacity), systematic_(capacity) {}
 
 void ChainSolver::Invalidate() {
   nodes_.clear();
-  cameras_.clear();
+  systematic_.clear();
   first_dirty_ = 0;
+  first_systematic_dirty_ = 0;
 }
 
 void ChainSolver::FixesChanged(std::int64_t first_id, std::int64_t last_id) {
   if (nodes_.empty()) return;  // nodes are new when they are made
   const std::int64_t oldest = nodes_.front().id;
-  for (std::int64_t id = std::max(first_id, oldest); id <= std::min(last_id, nodes_.back().id);
-       ++id)
+  const std::int64_t first = std::max(first_id, oldest);
+  for (std::int64_t id = first; id <= std::min(last_id, nodes_.back().id); ++id)
     nodes_[static_cast<std::size_t>(id - oldest)].are_fixes_new = true;
+  first_systematic_dirty_ =
+      std::min(first_systematic_dirty_, static_cast<std::size_t>(first - oldest));
 }
 
 void ChainSolver::Synchronize(const KeyframeWindow& window, const FixWeighting& weighting) {
   while (!nodes_.empty() && nodes_.front().id < window.keyframes.front().id) {
     nodes_.pop_front();
-    cameras_.pop_front();
+    systematic_.pop_front();
     if (first_dirty_ > 0) --first_dirty_;
+    if (first_systematic_dirty_ > 0) --first_systematic_dirty_;
   }
   for (std::size_t i = nodes_.size(); i < window.keyframes.size(); ++i) {
     const Keyframe& keyframe = window.keyframes[i];
@@ -114,14 +118,21 @@ void ChainSolver::Synchronize(const KeyframeWindow& window, const FixWeighting& 
     if (i > 0) {
       node.bias_kept = weighting.BiasKept(ToSeconds(keyframe.time - window.keyframes[i - 1].time));
     }
-    node.residual = keyframe.MotionResidual();
     nodes_.push_back(node);
-    cameras_.push_back({});
+    systematic_.push_back({});
+    TakeMotion(keyframe, i);
     first_dirty_ = std::min(first_dirty_, i);
+    first_systematic_dirty_ = std::min(first_systematic_dirty_, i);
   }
   RELOCD_CHECK(
       nodes_.size() == window.keyframes.size() && nodes_.front().id == window.keyframes.front().id,
       "the window was changed, and the solver not told");
+}
+
+void ChainSolver::TakeMotion(const Keyframe& keyframe, std::size_t i) {
+  nodes_[i].residual = keyframe.MotionResidual();
+  nodes_[i].is_motion_new = true;
+  systematic_[i].motion_P_by_odometry = MotionByOdometryErrors(keyframe.X_PK, keyframe.extent_PK);
 }
 
 void ChainSolver::Linearize(KeyframeWindow& window, const FixWeighting& weighting) {
@@ -155,6 +166,8 @@ void ChainSolver::LinearizeMotion(std::size_t i) {
   node.motion.offset = -(at.by_B.transpose() * error);
   node.motion.covariance = Symmetric(at.by_B.transpose() * node.residual.covariance() * at.by_B);
   node.motion_yaw = before.estimate().z();
+  SystematicNode& systematic = systematic_[i];
+  systematic.motion_by_odometry = at.by_B.transpose() * systematic.motion_P_by_odometry;
   node.is_motion_new = false;
 }
 
@@ -169,8 +182,12 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
   node.weighted_at = node.estimate();
   node.are_fixes_new = false;
   node.has_fixes = false;
-  CameraNode& camera = cameras_[static_cast<std::size_t>(node.id - nodes_.front().id)];
-  if (window.camera.IsSought()) camera = {};
+  SystematicNode& systematic = systematic_[static_cast<std::size_t>(node.id - nodes_.front().id)];
+  systematic.pose_rhs_by_camera.setZero();
+  systematic.information.setZero();
+  systematic.rhs.setZero();
+  systematic.rhs_by_bias.setZero();
+  const bool is_camera_sought = window.systematic.IsCameraSought();
   for (AttachedFix* fix = window.FirstFix(node.id);
        fix != window.fixes.end() && fix->keyframe_id == node.id;
        ++fix) {
@@ -183,14 +200,14 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
     node.information += gradient * at.by_K;
     node.rhs -= gradient * (at.error - at.by_K * node.delta);
     node.rhs_by_bias += gradient * fix->covariance_root;
-    if (window.camera.IsSought()) {
-      const ByCameraOffset by_camera = fix->ErrorByCamera(node.weighted_at.z());
+    if (is_camera_sought) {
+      const ByCamera by_camera = fix->ErrorByCamera(node.weighted_at.z());
       const Eigen::Matrix<double, 2, 3> camera_gradient =
           weight * by_camera.transpose() * information;
-      camera.pose_rhs_by_camera -= gradient * by_camera;
-      camera.information += camera_gradient * by_camera;
-      camera.rhs_by_bias += camera_gradient * fix->covariance_root;
-      camera.rhs -= camera_gradient * (at.error - at.by_K * node.delta);
+      systematic.pose_rhs_by_camera -= gradient * by_camera;
+      systematic.information += camera_gradient * by_camera;
+      systematic.rhs_by_bias += camera_gradient * fix->covariance_root;
+      systematic.rhs -= camera_gradient * (at.error - at.by_K * node.delta);
     }
     node.largest_information_m =
         std::max({node.largest_information_m, information(0, 0), information(1, 1)});
@@ -251,54 +268,61 @@ void ChainSolver::Correct(const Prediction& predicted, double misfit, double dam
   node.bias.covariance = Symmetric(part * kept.transpose() + node.bias.cross * by_bias.transpose());
 }
 
-ChainSolver::CameraState ChainSolver::PredictCamera(const KeyframeWindow& window,
-                                                    std::size_t i) const {
+ChainSolver::SystematicState ChainSolver::PredictSystematic(const KeyframeWindow& window,
+                                                            std::size_t i) const {
   if (i == 0) {
-    const CameraEffect effect = window.prior ? window.prior->camera : CameraEffect();
-    return {effect, window.camera.before_window};
+    const SystematicEffect effect = window.prior ? window.prior->systematic : SystematicEffect();
+    return {effect, window.systematic.before_window};
   }
   const Eigen::Vector3d& arm = nodes_[i].motion.arm;
-  CameraState predicted = cameras_[i - 1].state;
-  const CameraEffect before = predicted.effect;
-  predicted.effect.by_camera += arm * before.by_camera.row(2);
+  SystematicState predicted = systematic_[i - 1].state;
+  const SystematicEffect before = predicted.effect;
+  predicted.effect.by_errors += arm * before.by_errors.row(2);
+  predicted.effect.by_errors.rightCols<3>() += systematic_[i].motion_by_odometry;
   predicted.effect.bias_cross += before.bias_cross.col(2) * arm.transpose();
   predicted.known.bias_cross *= nodes_[i].bias_kept;
   return predicted;
 }
 
 /// What the fixes pull at the predicted pose, less what the pose gives way, is left for the
-/// camera's offset: the Schur complement of all poses until here. The pose is corrected before.
-void ChainSolver::CorrectCamera(const KeyframeWindow& window,
-                                const FixWeighting& weighting,
-                                const Prediction& predicted,
-                                std::size_t i) {
-  const CameraState before = PredictCamera(window, i);
+/// systematic errors: the Schur complement of all poses until here. The pose is corrected before.
+void ChainSolver::CorrectSystematic(const KeyframeWindow& window,
+                                    const FixWeighting& weighting,
+                                    const Prediction& predicted,
+                                    std::size_t i) {
+  const SystematicState before = PredictSystematic(window, i);
   const Node& node = nodes_[i];
-  const CameraNode& fixes = cameras_[i];
-  CameraState& state = cameras_[i].state;
+  const SystematicNode& fixes = systematic_[i];
+  SystematicState& state = systematic_[i].state;
   state = before;
   if (!node.has_fixes) return;
   const double misfit = weighting.misfit();
   const Eigen::Matrix3d information = node.information / misfit;
   const Eigen::Matrix3d kept = Eigen::Matrix3d::Identity() - node.covariance * information;
-  const ByCameraOffset rhs_by_camera = fixes.pose_rhs_by_camera / misfit;
-  const ByCameraOffset& by_camera = before.effect.by_camera;
-  const ByCameraOffset after = kept * by_camera + node.covariance * rhs_by_camera;
-  state.effect.by_camera = after;
-  state.known.information += fixes.information / misfit - rhs_by_camera.transpose() * by_camera -
-                             after.transpose() * (rhs_by_camera - information * by_camera);
-  state.known.rhs += fixes.rhs / misfit + rhs_by_camera.transpose() * predicted.mean +
-                     after.transpose() * (node.rhs / misfit - information * predicted.mean);
+  const ByCamera rhs_by_camera = fixes.pose_rhs_by_camera / misfit;
+  const BySystematic& by_errors = before.effect.by_errors;
+  BySystematic after = kept * by_errors;
+  after.leftCols<2>() += node.covariance * rhs_by_camera;
+  state.effect.by_errors = after;
+  BySystematic pulled = information * by_errors;
+  pulled.leftCols<2>() -= rhs_by_camera;
+  state.known.information += after.transpose() * pulled;
+  state.known.information.topRows<2>() -= rhs_by_camera.transpose() * by_errors;
+  state.known.information.topLeftCorner<2, 2>() += fixes.information / misfit;
+  state.known.rhs += after.transpose() * (node.rhs / misfit - information * predicted.mean);
+  state.known.rhs.head<2>() += fixes.rhs / misfit + rhs_by_camera.transpose() * predicted.mean;
 
   // The error of the rhs is that before + by_pose * (that of the prediction) + by_now * bias.
-  using ByPose = Eigen::Matrix<double, 2, 3>;
-  const ByPose by_pose = rhs_by_camera.transpose() - after.transpose() * information;
-  const ByPose by_now = (fixes.rhs_by_bias + after.transpose() * node.rhs_by_bias) / misfit;
+  using ByPose = Eigen::Matrix<double, 5, 3>;
+  ByPose by_pose = -after.transpose() * information;
+  by_pose.topRows<2>() += rhs_by_camera.transpose();
+  ByPose by_now = after.transpose() * node.rhs_by_bias / misfit;
+  by_now.topRows<2>() += fixes.rhs_by_bias / misfit;
   const FixBiasEffect& bias = predicted.bias;
   const ByPose with_pose =
       before.effect.bias_cross + by_pose * bias.covariance + by_now * bias.cross.transpose();
   const ByPose with_bias = before.known.bias_cross + by_pose * bias.cross;
-  const Eigen::Matrix2d mixed =
+  const SystematicMatrix mixed =
       with_bias * by_now.transpose() + before.effect.bias_cross * by_pose.transpose();
   state.known.bias_covariance += by_pose * bias.covariance * by_pose.transpose() +
                                  by_now * by_now.transpose() + mixed + mixed.transpose();
@@ -312,12 +336,16 @@ void ChainSolver::Eliminate(const KeyframeWindow& window,
                             const FixWeighting& weighting,
                             double damping,
                             std::size_t end) {
-  for (std::size_t i = first_dirty_; i < end; ++i) {
+  const bool is_sought = window.systematic.IsSought();
+  for (std::size_t i = std::min(first_dirty_, first_systematic_dirty_); i < end; ++i) {
     const Prediction predicted = i == 0 ? FromPrior(window) : Predict(i);
     Correct(predicted, weighting.misfit(), damping, nodes_[i]);
-    if (window.camera.IsSought()) CorrectCamera(window, weighting, predicted, i);
+    if (is_sought && i >= first_systematic_dirty_) {
+      CorrectSystematic(window, weighting, predicted, i);
+    }
   }
   first_dirty_ = std::max(first_dirty_, end);
+  first_systematic_dirty_ = std::max(first_systematic_dirty_, end);
 }
 
 ChainSolver::Step ChainSolver::Substitute(std::size_t first_new) {
@@ -338,21 +366,6 @@ ChainSolver::Step ChainSolver::Substitute(std::size_t first_new) {
     node.delta = delta;
   }
   return step;
-}
-
-bool ChainSolver::MoveCameraOffset(KeyframeWindow& window, const FixWeighting& weighting) {
-  CameraOffset& camera = window.camera;
-  if (!camera.IsSought()) return false;
-  const CameraKnowledge& known = cameras_.back().state.known;
-  const Eigen::Matrix2d posterior = CameraPosterior(camera.prior_sigmas, known.information);
-  camera.covariance = CameraCovariance(posterior, known, weighting);
-  const Eigen::Vector2d offset = posterior * (known.rhs + known.information * camera.estimate);
-  const Eigen::Array2d moved = (offset - camera.estimate).array().abs();
-  if (!(moved > kLeastOffset * camera.covariance.diagonal().array().sqrt()).any()) return false;
-  window.SetCameraOffset(offset);
-  for (Node& node : nodes_)
-    node.are_fixes_new = true;
-  return true;
 }
 
 void ChainSolver::WriteEstimates(KeyframeWindow& window) const {
@@ -448,6 +461,7 @@ bool ChainSolver::IterateDamped(KeyframeWindow& window,
   // The covariances without the damping, at the estimates that were reached.
   Linearize(window, weighting);
   first_dirty_ = 0;
+  first_systematic_dirty_ = 0;
   Eliminate(window, weighting, 0.0, nodes_.size());
   first_dirty_ = 0;  // the estimates are not those of this elimination
   return AreFinite();
@@ -463,12 +477,32 @@ bool ChainSolver::Solve(KeyframeWindow& window, const FixWeighting& weighting, i
     Invalidate();
     return false;
   }
-  if (MoveCameraOffset(window, weighting) && !IterateUndamped(window, weighting, max_iterations)) {
-    Invalidate();
-    return false;
-  }
   WriteEstimates(window);
   return true;
+}
+
+bool ChainSolver::EstimateSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting) {
+  SystematicErrors& systematic = window.systematic;
+  if (!systematic.IsSought()) return true;
+  Synchronize(window, weighting);
+  Linearize(window, weighting);
+  first_dirty_ = 0;
+  first_systematic_dirty_ = 0;
+  Eliminate(window, weighting, 0.0, nodes_.size());
+  const SystematicKnowledge& known = systematic_.back().state.known;
+  const SystematicMatrix posterior =
+      SystematicPosterior(systematic.prior_sigmas, known.information);
+  systematic.covariance = SystematicCovariance(posterior, known, weighting);
+  const SystematicVector before = systematic.estimate;
+  window.SetSystematicErrors(posterior * (known.rhs + known.information * before));
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    SystematicKnowledge& there = systematic_[i].state.known;
+    there.rhs -= there.information * (systematic.estimate - before);
+    nodes_[i].are_fixes_new = nodes_[i].are_fixes_new || systematic.IsCameraSought();
+    if (i > 0) TakeMotion(window.keyframes[i], i);
+  }
+  first_dirty_ = 0;
+  return Solve(window, weighting, 1);
 }
 
 Eigen::Matrix3d ChainSolver::NewestCovariance(const KeyframeWindow& window,
@@ -476,17 +510,21 @@ Eigen::Matrix3d ChainSolver::NewestCovariance(const KeyframeWindow& window,
   const Node& newest = nodes_.back();
   Eigen::Matrix3d covariance =
       newest.covariance + weighting.BiasVariance() * newest.bias.covariance;
-  if (window.camera.IsSought()) {
-    const CameraState& state = cameras_.back().state;
-    const ByCameraOffset& by_camera = state.effect.by_camera;
+  if (window.systematic.IsSought()) {
+    const SystematicState& state = systematic_.back().state;
+    const BySystematic& by_errors = state.effect.by_errors;
     const Eigen::Matrix3d mixed =
-        weighting.BiasVariance() * by_camera *
-        CameraPosterior(window.camera.prior_sigmas, state.known.information) *
+        weighting.BiasVariance() * by_errors *
+        SystematicPosterior(window.systematic.prior_sigmas, state.known.information) *
         state.effect.bias_cross;
-    covariance +=
-        by_camera * window.camera.covariance * by_camera.transpose() + mixed + mixed.transpose();
+    covariance += by_errors * window.systematic.covariance * by_errors.transpose() + mixed +
+                  mixed.transpose();
   }
   return AlongMap(covariance, -newest.estimate().z());
+}
+
+BySystematic ChainSolver::NewestBySystematicErrors() const {
+  return TangentRotation(-nodes_.back().estimate().z()) * systematic_.back().state.effect.by_errors;
 }
 
 void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting) {
@@ -494,14 +532,14 @@ void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& 
   Synchronize(window, weighting);
   if (nodes_[0].are_fixes_new) LinearizeFixes(window, weighting, nodes_[0]);
   if (nodes_[1].is_motion_new) LinearizeMotion(1);
-  if (first_dirty_ == 0) Eliminate(window, weighting, 0.0, 1);
+  if (std::min(first_dirty_, first_systematic_dirty_) == 0) Eliminate(window, weighting, 0.0, 1);
   const Prediction next = Predict(1);
   const Eigen::Vector3d x_WM = nodes_[1].reference + next.mean;
   window.prior = KeyframePrior{.pose = {.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
                                         .covariance = AlongMap(next.covariance, -x_WM.z())},
                                .bias = next.bias,
-                               .camera = {}};
-  if (window.camera.IsSought()) ForgetCamera(PredictCamera(window, 1), window);
+                               .systematic = {}};
+  if (window.systematic.IsSought()) ForgetSystematic(PredictSystematic(window, 1), window);
   window.PopFront();
 }
 
@@ -543,22 +581,22 @@ std::vector<Eigen::Matrix3d> ChainSolver::SmoothedCovariances(KeyframeWindow& wi
   std::vector<Eigen::Matrix3d> with_bias(nodes_.size());
   smoothed.back() = nodes_.back().covariance;
   SmoothedBias bias;
-  const CameraKnowledge& known = cameras_.back().state.known;
-  window.camera.covariance = CameraCovariance(
-      CameraPosterior(window.camera.prior_sigmas, known.information), known, weighting);
-  ByCameraOffset by_camera = cameras_.back().state.effect.by_camera;
+  const SystematicKnowledge& known = systematic_.back().state.known;
+  window.systematic.covariance = SystematicCovariance(
+      SystematicPosterior(window.systematic.prior_sigmas, known.information), known, weighting);
+  BySystematic by_errors = systematic_.back().state.effect.by_errors;
   with_bias.back() = smoothed.back() + weighting.BiasVariance() * nodes_.back().bias.covariance +
-                     by_camera * window.camera.covariance * by_camera.transpose();
+                     by_errors * window.systematic.covariance * by_errors.transpose();
   for (std::size_t i = nodes_.size() - 1; i-- > 0;) {
     const Prediction predicted = Predict(i + 1);
     const Eigen::Matrix3d& gain = nodes_[i].gain;
     smoothed[i] = Symmetric(nodes_[i].covariance +
                             gain * (smoothed[i + 1] - predicted.covariance) * gain.transpose());
     bias = BiasBefore(i, bias, weighting);
-    const CameraEffect after = PredictCamera(window, i + 1).effect;
-    by_camera = cameras_[i].state.effect.by_camera + gain * (by_camera - after.by_camera);
+    const SystematicEffect after = PredictSystematic(window, i + 1).effect;
+    by_errors = systematic_[i].state.effect.by_errors + gain * (by_errors - after.by_errors);
     with_bias[i] = smoothed[i] + weighting.BiasVariance() * bias.Covariance(nodes_[i].bias) +
-                   by_camera * window.camera.covariance * by_camera.transpose();
+                   by_errors * window.systematic.covariance * by_errors.transpose();
   }
   for (std::size_t i = 0; i < with_bias.size(); ++i)
     with_bias[i] = AlongMap(with_bias[i], -nodes_[i].reference.z());

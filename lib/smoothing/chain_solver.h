@@ -26,9 +26,9 @@ namespace relocd {
 /// Covariances are carried instead of information: a vague prior next to a stiff chain loses no
 /// digits. Fixes are weighted as if they erred independently; what a bias that lasts does to these
 /// estimates is carried along and added to their covariances (a filter that "considers" it:
-/// Schmidt, 1966). How a camera's offset moves them is carried along too, and what that tells of
-/// the offset (a bias beside a filter: Friedland, 1969). Allocates nothing once it has seen its
-/// largest window. Thread-bound.
+/// Schmidt, 1966). How the systematic errors of camera and odometry move them is carried along too,
+/// and what that tells of those errors (a bias beside a filter: Friedland, 1969). Allocates nothing
+/// once it has seen its largest window. Thread-bound.
 class ChainSolver {
  public:
   /// @param capacity  the most keyframes that there will be without an allocation.
@@ -43,24 +43,32 @@ class ChainSolver {
   /// shares of the fixes must be set.
   ///
   /// Gauss and Newton's step; where that would turn a keyframe far and not lower the cost, damped
-  /// ones. The camera's offset follows when it is known better by a tenth of its sigma. The same
-  /// calls give the same bits.
+  /// ones. The systematic errors stay. The same calls give the same bits.
   ///
   /// @return whether the estimates are finite; if not, they are as before.
   bool Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
 
+  /// Estimates the systematic errors from all that the window knows, and moves its estimates with
+  /// them. Looks at each keyframe, as Solve does not.
+  ///
+  /// @return as Solve.
+  bool EstimateSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting);
+
   /// The covariance of the newest keyframe's right perturbation given all in the window, as of the
-  /// last Solve: the last block of the elimination, and what the fixes' bias and the camera's
-  /// offset add.
+  /// last Solve: the last block of the elimination, and what the fixes' bias and the
+  /// systematic errors add.
   [[nodiscard]] Eigen::Matrix3d NewestCovariance(const KeyframeWindow& window,
                                                  const FixWeighting& weighting) const;
+
+  /// The derivative of the newest keyframe's right perturbation by the systematic errors.
+  [[nodiscard]] BySystematic NewestBySystematicErrors() const;
 
   /// Takes the oldest keyframe and its fixes out of the window, and leaves what they say of the
   /// next one as its prior. The window must have two keyframes.
   void MarginalizeOldest(KeyframeWindow& window, const FixWeighting& weighting);
 
   /// The covariances of all keyframes' right perturbations given all in the window, at the window's
-  /// estimates; and that of the camera's offset, written into the window.
+  /// estimates; and that of the systematic errors, written into the window.
   std::vector<Eigen::Matrix3d> SmoothedCovariances(KeyframeWindow& window,
                                                    const FixWeighting& weighting);
 
@@ -130,23 +138,27 @@ class ChainSolver {
     FixBiasEffect bias;
   };
 
-  /// What is known of the camera's offset from a keyframe and those before it, and what it does to
-  /// the keyframe's mean.
-  struct CameraState {
-    CameraEffect effect;
-    CameraKnowledge known;
+  /// What is known of the systematic errors from a keyframe and those before it, and what they do
+  /// to the keyframe's mean.
+  struct SystematicState {
+    SystematicEffect effect;
+    SystematicKnowledge known;
   };
 
-  /// A keyframe's part of the equations that concerns the camera's offset, apart from the node:
-  /// where none is sought, the nodes are nearer together in the cache.
-  struct CameraNode {
-    /// The fixes' part, without the misfit: with the keyframe as it is, information * offset = rhs.
-    ByCameraOffset pose_rhs_by_camera = ByCameraOffset::Zero();
+  /// A keyframe's part of the equations that concerns the systematic errors, apart from the node:
+  /// what each fix looks at in all nodes is nearer together in the cache.
+  struct SystematicNode {
+    /// Of the motion from the node before, along that node's axes and along W's.
+    ByOdometry motion_P_by_odometry = ByOdometry::Zero();
+    ByOdometry motion_by_odometry = ByOdometry::Zero();
+    /// The fixes' part, without the misfit: with the keyframe as it is, information * (the camera's
+    /// errors) = rhs.
+    ByCamera pose_rhs_by_camera = ByCamera::Zero();
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
     Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
     Eigen::Matrix<double, 2, 3> rhs_by_bias = Eigen::Matrix<double, 2, 3>::Zero();
 
-    CameraState state;
+    SystematicState state;
   };
 
   /// The largest changes of one step.
@@ -170,6 +182,8 @@ class ChainSolver {
                                         const FixWeighting& weighting) const;
 
   void Synchronize(const KeyframeWindow& window, const FixWeighting& weighting);
+  /// The motion to a node is the keyframe's.
+  void TakeMotion(const Keyframe& keyframe, std::size_t i);
   void Linearize(KeyframeWindow& window, const FixWeighting& weighting);
   void LinearizeMotion(std::size_t i);
   void LinearizeFixes(KeyframeWindow& window, const FixWeighting& weighting, Node& node);
@@ -183,14 +197,13 @@ class ChainSolver {
                  double damping,
                  std::size_t end);
   Step Substitute(std::size_t first_new);
-  [[nodiscard]] CameraState PredictCamera(const KeyframeWindow& window, std::size_t i) const;
-  void CorrectCamera(const KeyframeWindow& window,
-                     const FixWeighting& weighting,
-                     const Prediction& predicted,
-                     std::size_t i);
-  static void ForgetCamera(const CameraState& next, KeyframeWindow& window);
-  /// @return whether the offset is another, and so all fixes are to be linearised anew.
-  bool MoveCameraOffset(KeyframeWindow& window, const FixWeighting& weighting);
+  [[nodiscard]] SystematicState PredictSystematic(const KeyframeWindow& window,
+                                                  std::size_t i) const;
+  void CorrectSystematic(const KeyframeWindow& window,
+                         const FixWeighting& weighting,
+                         const Prediction& predicted,
+                         std::size_t i);
+  static void ForgetSystematic(const SystematicState& next, KeyframeWindow& window);
   void WriteEstimates(KeyframeWindow& window) const;
 
   bool IterateUndamped(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
@@ -200,9 +213,11 @@ class ChainSolver {
   [[nodiscard]] bool AreFinite() const;
 
   SlidingVector<Node> nodes_;
-  SlidingVector<CameraNode> cameras_;  ///< Of the same keyframes.
-  std::size_t first_dirty_ = 0;        ///< From here on the elimination is to be done again.
-  double misfit_ = 0.0;                ///< Of the elimination.
+  SlidingVector<SystematicNode> systematic_;  ///< Of the same keyframes.
+  std::size_t first_dirty_ = 0;               ///< From here on the elimination is to be done again.
+  /// From here on fixes are new to what is known of the systematic errors.
+  std::size_t first_systematic_dirty_ = 0;
+  double misfit_ = 0.0;  ///< Of the elimination.
 };
 
 }  // namespace relocd

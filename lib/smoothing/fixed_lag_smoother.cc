@@ -42,6 +42,10 @@ constexpr std::size_t kUsualFixesPerKeyframe = 4;
 /// differs by more than this.
 constexpr int kMisfitParts = 30;
 constexpr double kMisfitChange = 0.05;
+/// The systematic errors are estimated anew when so many parts of the fixes are new: of all fixes,
+/// as far back as is not nearly forgotten. It costs several times what a fix does otherwise.
+constexpr std::int64_t kSystematicParts = 50;
+constexpr std::int64_t kSystematicMemory = 10000;
 /// Motion of a keyframe's first instant: its covariance must be positive definite.
 constexpr double kLeastVariance = 1e-10;
 /// Least distance and turn that make a body "moving" for the keyframes by time.
@@ -117,10 +121,13 @@ FixWeighting WeightingOf(const SmootherConfig& config) {
           {.sigmas = config.fix_bias_sigmas, .time_s = config.fix_bias_time_s}};
 }
 
-CameraOffset CameraOf(const SmootherConfig& config) {
-  CameraOffset camera{.prior_sigmas = {config.camera_yaw_sigma_rad, config.camera_time_sigma_s}};
-  camera.covariance = camera.prior_sigmas.cwiseAbs2().asDiagonal();
-  return camera;
+SystematicErrors SystematicErrorsOf(const SmootherConfig& config) {
+  SystematicErrors errors;
+  errors.prior_sigmas << config.camera_yaw_sigma_rad, config.camera_time_sigma_s,
+      config.odometry_scale_sigma, config.odometry_drift_sigma_rad_per_m,
+      config.odometry_yaw_rate_sigma_rad_per_s;
+  errors.covariance = errors.prior_sigmas.cwiseAbs2().asDiagonal();
+  return errors;
 }
 
 FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
@@ -129,11 +136,8 @@ FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
       consensus_options_{.radius_sigmas = config.relocalization_radius_sigmas,
                          .min_radius_m = config.relocalization_min_radius_m},
       history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
-      chain_(static_cast<std::size_t>(config.window_keyframes) + 1),
-      drift_({.rad_per_m = config.odometry_drift_sigma_rad_per_m,
-              .rad_per_s = config.odometry_yaw_rate_sigma_rad_per_s,
-              .scale = config.odometry_scale_sigma}) {
-  window_.camera = CameraOf(config);
+      chain_(static_cast<std::size_t>(config.window_keyframes) + 1) {
+  window_.systematic = SystematicErrorsOf(config);
   const auto keyframes = static_cast<std::size_t>(config.window_keyframes) + 1;
   window_.keyframes.Reserve(keyframes);
   window_.fixes.Reserve(keyframes * kUsualFixesPerKeyframe);
@@ -164,6 +168,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   agreements_since_start_ = 0;
   window_.prior = KeyframePrior{.pose = prior};
   newest_covariance_ = prior.covariance;
+  newest_by_errors_.setZero();
   if (window_.keyframes.empty()) return {};
   // A keyframe where the body is now: the prior is about this moment.
   OdometrySample sample = history_.newest();
@@ -177,6 +182,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   window_.prior = KeyframePrior{.pose = prior};
   window_.keyframes.front().SetX_WK(prior.X_WB);
   newest_covariance_ = prior.covariance;
+  newest_by_errors_.setZero();
   chain_.Invalidate();
   return {};
 }
@@ -206,7 +212,8 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
   }
   const auto motion =
       MotionExtent::Of(step.X_BprevB, ToSeconds(step.time - history_.newest().time));
-  const Pose2 X_AB = drift_.Correct(step.X_BprevB, motion);
+  const auto correction = MotionCorrection::Of(motion, OdometryPart(window_.systematic.estimate));
+  const Pose2 X_AB = CorrectMotion(step.X_BprevB, motion, correction);
   newest_motion_ = X_AB;
   OdometrySample sample = history_.newest();
   sample.time = step.time;
@@ -214,7 +221,9 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
   sample.X_KB = sample.X_KB * X_AB;
   sample.covariance_KB = ComposeCovariance(sample.covariance_KB, X_AB, covariance);
   sample.step_covariance = covariance;
+  odometer_m_ += motion.way_m;
   extent_ += motion;
+  correction_ += correction;
 
   const double distance = sample.X_KB.translation().norm();
   const double turn = std::abs(sample.X_KB.yaw());
@@ -246,14 +255,12 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
   keyframe.time = sample.time;
   keyframe.generation = before.generation;
   keyframe.X_OB = sample.X_OB;
-  keyframe.extent = extent_;
-  keyframe.corrected_turn_rad = drift_.corrected_turn_rad();
-  keyframe.corrected_way_m = drift_.corrected_way_m();
   keyframe.X_PK = sample.X_KB;
-  keyframe.drift_covariance_PK = drift_.Covariance(extent_ - before.extent);
-  keyframe.covariance_PK = sample.covariance_KB + keyframe.drift_covariance_PK;
-  keyframe.SetX_WK(before.X_WK() * sample.X_KB);
-  newest_covariance_ = ComposeCovariance(newest_covariance_, sample.X_KB, keyframe.covariance_PK);
+  keyframe.covariance_PK = sample.covariance_KB;
+  keyframe.extent_PK = std::exchange(extent_, {});
+  keyframe.correction_PK = std::exchange(correction_, {});
+  keyframe.SetX_WK(before.X_WK() * keyframe.X_PK);
+  MoveNewestCovariance(keyframe);
   window_.keyframes.push_back(std::move(keyframe));
 
   sample.keyframe_id = window_.keyframes.back().id;
@@ -262,6 +269,18 @@ void FixedLagSmoother::AddKeyframe(OdometrySample& sample) {
   while (window_.keyframes.size() > static_cast<std::size_t>(config_.window_keyframes)) {
     RemoveOldest();
   }
+}
+
+void FixedLagSmoother::MoveNewestCovariance(const Keyframe& next) {
+  const SystematicMatrix& errors = window_.systematic.covariance;
+  const Eigen::Matrix3d back = next.X_PK.Inverse().Adjoint();
+  BySystematic by_errors = back * newest_by_errors_;
+  const Eigen::Matrix3d before = by_errors * errors * by_errors.transpose();
+  by_errors.rightCols<3>() += Pose2(0.0, 0.0, -next.X_PK.yaw()).Adjoint() *
+                              MotionByOdometryErrors(next.X_PK, next.extent_PK);
+  newest_covariance_ = ComposeCovariance(newest_covariance_, next.X_PK, next.covariance_PK) +
+                       by_errors * errors * by_errors.transpose() - before;
+  newest_by_errors_ = by_errors;
 }
 
 void FixedLagSmoother::RemoveOldest() {
@@ -275,7 +294,10 @@ void FixedLagSmoother::RemoveOldest() {
   const bool had_prior = window_.prior.has_value();
   chain_.MarginalizeOldest(window_, weighting_);
   // Before the start the estimates mean nothing, and so would a prior from them.
-  if (!is_started_ && !had_prior) window_.prior.reset();
+  if (!is_started_ && !had_prior) {
+    window_.prior.reset();
+    window_.systematic.before_window = {};
+  }
 }
 
 void FixedLagSmoother::ReattachProvisional() {
@@ -309,7 +331,7 @@ std::optional<AttachedFix> FixedLagSmoother::Attach(const Fix& fix,
   attached.X_KB = sample.X_KB;
   attached.covariance_KB = sample.covariance_KB;
   attached.is_provisional = sample.is_extrapolated;
-  if (window_.camera.IsSought()) {
+  if (window_.systematic.IsCameraSought()) {
     const auto velocity = history_.VelocityAt(sample.time);
     if (!velocity) return std::nullopt;
     attached.is_provisional = history_.newest().time < sample.time + PoseHistory::kVelocityReach;
@@ -318,7 +340,7 @@ std::optional<AttachedFix> FixedLagSmoother::Attach(const Fix& fix,
     if (fix.has_heading) attached.X_BF_by_camera.col(0) << fix.p_BC.y(), -fix.p_BC.x(), 1.0;
     attached.X_BF_by_camera.col(1) = -*velocity;
   }
-  PrepareResidual(attached, window_.camera.estimate);
+  PrepareResidual(attached, CameraPart(window_.systematic.estimate));
   return attached;
 }
 
@@ -413,7 +435,7 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
 void FixedLagSmoother::NoteSupport(const OdometrySample& sample) {
   if (!last_support_ || sample.time > *last_support_) {
     last_support_ = sample.time;
-    odometer_at_fix_m_ = extent_.way_m;
+    odometer_at_fix_m_ = odometer_m_;
   }
 }
 
@@ -562,10 +584,16 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
     weighting_.SetScatter(errors.scatter);
     const double change = std::abs(errors.misfit / weighting_.misfit() - 1.0);
     if (change > kMisfitChange) weighting_.SetMisfit(errors.misfit);
-    drift_.Estimate(window_, newest_covariance_);
   }
-  if (chain_.Solve(window_, weighting_, max_iterations)) {
+  bool is_solved = chain_.Solve(window_, weighting_, max_iterations);
+  if (is_solved && --fixes_until_systematic_ <= 0) {
+    fixes_until_systematic_ =
+        static_cast<int>(std::min(counters_.fixes_accepted, kSystematicMemory) / kSystematicParts);
+    is_solved = chain_.EstimateSystematicErrors(window_, weighting_);
+  }
+  if (is_solved) {
     newest_covariance_ = chain_.NewestCovariance(window_, weighting_);
+    newest_by_errors_ = chain_.NewestBySystematicErrors();
     if (IsCovariance(newest_covariance_)) return;
   }
   ++counters_.solver_failures;
@@ -578,11 +606,12 @@ void FixedLagSmoother::RestartAtNewest() {
   newest_covariance_ *= kDoubt;
   newest_covariance_.diagonal() += kLeastSigmas.cwiseAbs2();
   if (!IsCovariance(newest_covariance_)) newest_covariance_ = Eigen::Matrix3d::Identity();
+  newest_by_errors_.setZero();
   window_.keyframes.clear();
   window_.fixes.clear();
   provisional_fixes_ = 0;
   window_.last_removed_fix.reset();
-  window_.camera = CameraOf(config_);
+  window_.systematic = SystematicErrorsOf(config_);
   chain_.Invalidate();
   newest.fixes = 0;
   newest.gated_fixes = 0;
@@ -602,7 +631,7 @@ std::optional<SmootherEstimate> FixedLagSmoother::EstimateAt(MonotonicTime time)
   estimate.time = time;
   if (last_support_) {
     estimate.time_since_fix_s = std::max(0.0, ToSeconds(time - *last_support_));
-    estimate.distance_since_fix_m = extent_.way_m - odometer_at_fix_m_;
+    estimate.distance_since_fix_m = odometer_m_ - odometer_at_fix_m_;
   }
   if (!is_started_) {
     if (!unstarted_fix_) return estimate;

@@ -19,9 +19,9 @@
 #include "smoothing/fix.h"
 #include "smoothing/fix_misfit.h"
 #include "smoothing/keyframe_window.h"
-#include "smoothing/odometry_drift.h"
 #include "smoothing/pose_history.h"
 #include "smoothing/smoother_config.h"
+#include "smoothing/systematic_errors.h"
 
 namespace relocd {
 
@@ -50,8 +50,8 @@ bool IsCertain(const Eigen::Matrix3d& covariance, const SmootherConfig& config);
 /// How its fixes are weighted.
 FixWeighting WeightingOf(const SmootherConfig& config);
 
-/// What is believed of a camera before its first fix.
-CameraOffset CameraOf(const SmootherConfig& config);
+/// What is believed of camera and odometry before the first fix.
+SystematicErrors SystematicErrorsOf(const SmootherConfig& config);
 
 /// What became of a fix.
 enum class FixOutcome {
@@ -129,12 +129,13 @@ class FixedLagSmoother {
   [[nodiscard]] const KeyframeWindow& window() const { return window_; }
   [[nodiscard]] const SmootherConfig& config() const { return config_; }
   [[nodiscard]] const FixWeighting& weighting() const { return weighting_; }
-  [[nodiscard]] const OdometryDrift& drift() const { return drift_; }
-  [[nodiscard]] const CameraOffset& camera() const { return window_.camera; }
+  [[nodiscard]] const SystematicErrors& systematic_errors() const { return window_.systematic; }
 
  private:
   void Begin(MonotonicTime time);
   void AddKeyframe(OdometrySample& sample);
+  /// From the keyframe before to `next`.
+  void MoveNewestCovariance(const Keyframe& next);
   void RemoveOldest();
   void ReattachProvisional();
 
@@ -181,16 +182,20 @@ class FixedLagSmoother {
   KeyframeWindow window_;
   ChainSolver chain_;
   FixMisfit misfit_;
-  OdometryDrift drift_;
   int fixes_until_misfit_ = 0;
-  int provisional_fixes_ = 0;                                    ///< In the window.
+  int fixes_until_systematic_ = 0;
+  int provisional_fixes_ = 0;  ///< In the window.
+  bool is_started_ = false;
   Eigen::Matrix3d newest_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the newest keyframe.
-  std::vector<Voter> voters_;                                    ///< By time, the newest last.
+  /// What the systematic errors do to it, along its axes: a part of that covariance.
+  BySystematic newest_by_errors_ = BySystematic::Zero();
+  std::vector<Voter> voters_;  ///< By time, the newest last.
 
   Pose2 newest_motion_;
-  bool is_started_ = false;
   std::optional<Fix> unstarted_fix_;  ///< The newest, for a first position.
-  MotionExtent extent_;               ///< Of all odometry.
+  double odometer_m_ = 0.0;           ///< Of all odometry.
+  MotionExtent extent_;               ///< Since the newest keyframe.
+  MotionCorrection correction_;       ///< Put into the odometry since then.
   double odometer_at_fix_m_ = 0.0;
   std::optional<MonotonicTime> last_support_;
   std::int64_t agreements_since_start_ = 0;  ///< Fixes that lay where they were predicted.

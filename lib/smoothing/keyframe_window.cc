@@ -90,20 +90,29 @@ AttachedFix* UpdateSharesOfOne(AttachedFix* first,
 
 }  // namespace
 
-Pose2 AttachedFix::MotionWith(const Eigen::Vector2d& camera_offset) const {
-  const Eigen::Vector3d x_BF = X_BF_by_camera * camera_offset;
+void Keyframe::CorrectMotionBy(const Eigen::Vector3d& odometry_errors) {
+  const auto correction = MotionCorrection::Of(extent_PK, odometry_errors);
+  X_PK = CorrectMotion(X_PK,
+                       extent_PK,
+                       {.way_m = correction.way_m - correction_PK.way_m,
+                        .turn_rad = correction.turn_rad - correction_PK.turn_rad});
+  correction_PK = correction;
+}
+
+Pose2 AttachedFix::MotionWith(const Eigen::Vector2d& camera_errors) const {
+  const Eigen::Vector3d x_BF = X_BF_by_camera * camera_errors;
   return X_KB * Pose2(x_BF.x(), x_BF.y(), x_BF.z());
 }
 
-ByCameraOffset AttachedFix::ErrorByCamera(double yaw_WK) const {
+ByCamera AttachedFix::ErrorByCamera(double yaw_WK) const {
   const Eigen::Rotation2Dd R_WB(yaw_WK + X_KB.yaw());
-  ByCameraOffset by_camera = X_BF_by_camera;
+  ByCamera by_camera = X_BF_by_camera;
   by_camera.topRows<2>() = R_WB * X_BF_by_camera.topRows<2>();
   return by_camera;
 }
 
-void PrepareResidual(AttachedFix& fix, const Eigen::Vector2d& camera_offset) {
-  fix.X_KF = fix.MotionWith(camera_offset);
+void PrepareResidual(AttachedFix& fix, const Eigen::Vector2d& camera_errors) {
+  fix.X_KF = fix.MotionWith(camera_errors);
   const Eigen::Matrix3d covariance = TotalCovariance(fix);
   fix.covariance_root = CovarianceRoot(fix.fix);
   fix.residual = fix.fix.has_heading
@@ -158,14 +167,18 @@ AttachedFix& KeyframeWindow::Insert(AttachedFix fix) {
   return *fixes.insert(after, std::move(fix));
 }
 
-void KeyframeWindow::SetCameraOffset(const Eigen::Vector2d& offset) {
-  const Eigen::Vector2d change = offset - camera.estimate;
-  camera.estimate = offset;
-  camera.before_window.rhs -= camera.before_window.information * change;
-  for (AttachedFix& fix : fixes)
-    PrepareResidual(fix, offset);
+void KeyframeWindow::SetSystematicErrors(const SystematicVector& errors) {
+  const SystematicVector change = errors - systematic.estimate;
+  systematic.estimate = errors;
+  systematic.before_window.rhs -= systematic.before_window.information * change;
+  if (!CameraPart(change).isZero(0.0)) {
+    for (AttachedFix& fix : fixes)
+      PrepareResidual(fix, CameraPart(errors));
+  }
+  for (Keyframe& keyframe : keyframes)
+    keyframe.CorrectMotionBy(OdometryPart(errors));
   if (!prior) return;
-  const Eigen::Vector3d moved = prior->camera.by_camera * change;
+  const Eigen::Vector3d moved = prior->systematic.by_errors * change;
   const Pose2& X_WM = prior->pose.X_WB;
   prior->pose.X_WB = Pose2(X_WM.x() + moved.x(), X_WM.y() + moved.y(), X_WM.yaw() + moved.z());
 }

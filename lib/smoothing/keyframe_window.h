@@ -14,28 +14,9 @@
 #include "smoothing/fix.h"
 #include "smoothing/relative_pose_residual.h"
 #include "smoothing/sliding_vector.h"
+#include "smoothing/systematic_errors.h"
 
 namespace relocd {
-
-/// How far the odometry has gone: that by which it can drift.
-struct MotionExtent {
-  double way_m = 0.0;
-  double driven_s = 0.0;  ///< But for the time in which it measured no motion at all.
-
-  /// Of one motion. One of exactly zero is that of a body which is known to stand.
-  static MotionExtent Of(const Pose2& motion, double seconds) {
-    const double way_m = motion.translation().norm();
-    return {way_m, way_m > 0.0 || motion.yaw() != 0.0 ? seconds : 0.0};
-  }
-  MotionExtent& operator+=(const MotionExtent& more) {
-    way_m += more.way_m;
-    driven_s += more.driven_s;
-    return *this;
-  }
-  friend MotionExtent operator-(const MotionExtent& a, const MotionExtent& b) {
-    return {a.way_m - b.way_m, a.driven_s - b.driven_s};
-  }
-};
 
 /// A pose that is estimated, and the composed odometry that leads to it.
 struct Keyframe {
@@ -43,13 +24,10 @@ struct Keyframe {
   MonotonicTime time{};
   Pose2 X_OB;
   Eigen::Vector3d x_WK = Eigen::Vector3d::Zero();  ///< The estimate X_WK: x, y, unwrapped yaw.
-  Pose2 X_PK;                                      ///< The motion from the keyframe before (P).
+  Pose2 X_PK;  ///< The motion from the keyframe before (P), put right by the systematic errors.
   Eigen::Matrix3d covariance_PK = Eigen::Matrix3d::Identity();
-  /// The part of it that is there because the odometry's drift was not known better.
-  Eigen::Matrix3d drift_covariance_PK = Eigen::Matrix3d::Zero();
-  MotionExtent extent;              ///< Until here.
-  double corrected_turn_rad = 0.0;  ///< Put into the odometry until here, by OdometryDrift.
-  double corrected_way_m = 0.0;     ///< Likewise.
+  MotionExtent extent_PK;
+  MotionCorrection correction_PK;  ///< Already put into X_PK.
   /// How often the estimates had been started anew when this one was last estimated.
   std::int64_t generation = 0;
   int fixes = 0;        ///< That are attached to it and have influence.
@@ -60,50 +38,19 @@ struct Keyframe {
   [[nodiscard]] Pose2 X_WK() const { return {x_WK.x(), x_WK.y(), x_WK.z()}; }
   void SetX_WK(const Pose2& X_WK) { x_WK << X_WK.translation(), X_WK.yaw(); }
   [[nodiscard]] RelativePoseResidual MotionResidual() const { return {X_PK, covariance_PK}; }
-};
-
-/// The derivative of a planar tangent by a camera's offset.
-using ByCameraOffset = Eigen::Matrix<double, 3, 2>;
-
-/// What keyframes say of a camera's offset: information * (offset - estimate) = rhs. Of the rhs, a
-/// bias of the fixes makes a part, given here for a bias of sigma one.
-struct CameraKnowledge {
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d bias_covariance = Eigen::Matrix2d::Zero();
-  Eigen::Matrix<double, 2, 3> bias_cross = Eigen::Matrix<double, 2, 3>::Zero();  ///< With the bias.
-};
-
-/// What a camera's offset does to an estimate, along W's axes, whose covariance is for a known one.
-struct CameraEffect {
-  ByCameraOffset by_camera = ByCameraOffset::Zero();
-  /// Covariance of what the fixes' bias makes of the knowledge's rhs and of the estimate.
-  Eigen::Matrix<double, 2, 3> bias_cross = Eigen::Matrix<double, 2, 3>::Zero();
-};
-
-/// What a camera gets wrong in all its fixes alike, as (yaw, time): it looks so many radians
-/// farther to the left than the config says, and its fixes' times are so many seconds late.
-///
-/// Two constants with Gaussian priors about zero. With several cameras it is what they have in
-/// common.
-struct CameraOffset {
-  Eigen::Vector2d prior_sigmas = Eigen::Vector2d::Zero();  ///< Of 0: it is not looked for.
-  Eigen::Vector2d estimate = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  CameraKnowledge before_window = {};  ///< From the keyframes that have left it.
-
-  [[nodiscard]] bool IsSought() const { return prior_sigmas.maxCoeff() > 0.0; }
+  /// Puts X_PK right by these errors of the odometry, in place of those it was put right by.
+  void CorrectMotionBy(const Eigen::Vector3d& odometry_errors);
 };
 
 /// A fix at the place F, and the motion to F from the keyframe before it: that of the body B at the
-/// fix's time, and what the camera's offset makes of it.
+/// fix's time, and what the camera's errors make of it.
 struct AttachedFix {
   Fix fix;
   std::int64_t keyframe_id = 0;
   Pose2 X_KB;
   Eigen::Matrix3d covariance_KB = Eigen::Matrix3d::Zero();
-  ByCameraOffset X_BF_by_camera = ByCameraOffset::Zero();  ///< X_BF = Pose2(this * offset).
-  Pose2 X_KF;                                              ///< With the present estimate.
+  ByCamera X_BF_by_camera = ByCamera::Zero();  ///< X_BF = Pose2(this * the camera's errors).
+  Pose2 X_KF;                                  ///< With the present estimate.
   bool is_provisional = false;  ///< To be attached anew when the odometry has gone on.
   bool is_gated = false;        ///< Kept, but without influence.
   double share = 0.0;           ///< Of it that is news, by UpdateShares.
@@ -111,14 +58,14 @@ struct AttachedFix {
   Eigen::Matrix3d covariance_root = Eigen::Matrix3d::Zero();
   AbsolutePoseResidual residual;
 
-  /// X_KF with another camera offset.
-  [[nodiscard]] Pose2 MotionWith(const Eigen::Vector2d& camera_offset) const;
-  /// The derivative of the residual's error by the camera's offset, where K looks to `yaw_WK`.
-  [[nodiscard]] ByCameraOffset ErrorByCamera(double yaw_WK) const;
+  /// X_KF with other errors of the camera.
+  [[nodiscard]] Pose2 MotionWith(const Eigen::Vector2d& camera_errors) const;
+  /// The derivative of the residual's error by the camera's errors, where K looks to `yaw_WK`.
+  [[nodiscard]] ByCamera ErrorByCamera(double yaw_WK) const;
 };
 
 /// Fills in `X_KF`, `residual` and `covariance_root` from the other members.
-void PrepareResidual(AttachedFix& fix, const Eigen::Vector2d& camera_offset = {0.0, 0.0});
+void PrepareResidual(AttachedFix& fix, const Eigen::Vector2d& camera_errors = {0.0, 0.0});
 
 /// Neighbouring fixes err together by a slowly varying bias: a Gauss-Markov process along W's axes.
 struct FixBias {
@@ -180,7 +127,7 @@ class FixWeighting {
 struct KeyframePrior {
   PlanarPose pose;
   FixBiasEffect bias = {};  ///< Along W's axes, not part of the pose's covariance.
-  CameraEffect camera = {};
+  SystematicEffect systematic = {};
 };
 
 /// A chain of keyframes with fixes on them, and what is known of its oldest from those before.
@@ -188,7 +135,7 @@ struct KeyframeWindow {
   SlidingVector<Keyframe> keyframes;
   SlidingVector<AttachedFix> fixes;               ///< By time.
   std::optional<KeyframePrior> prior;             ///< Of the oldest keyframe.
-  CameraOffset camera;                            ///< Of all fixes.
+  SystematicErrors systematic;                    ///< Of all fixes and motions.
   std::optional<MonotonicTime> last_removed_fix;  ///< The next one may be correlated with it.
 
   [[nodiscard]] bool Has(std::int64_t keyframe_id) const;
@@ -200,8 +147,8 @@ struct KeyframeWindow {
 
   /// Puts a fix in its place by time, and counts it with its keyframe.
   AttachedFix& Insert(AttachedFix fix);
-  /// Moves the estimate of the camera's offset, the fixes and the prior with it.
-  void SetCameraOffset(const Eigen::Vector2d& offset);
+  /// Puts all fixes and motions right by other systematic errors, and moves the prior with them.
+  void SetSystematicErrors(const SystematicVector& errors);
   /// Takes the oldest keyframe and its fixes out. The window must have two keyframes.
   void PopFront();
 };

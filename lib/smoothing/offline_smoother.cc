@@ -40,27 +40,21 @@ void Feed(const MotionLog& log, FixedLagSmoother& smoother, AfterFix after_fix) 
   if (step < log.odometry.size()) feed_odometry(log.odometry[step].time);
 }
 
-/// All keyframes of a log, first as the fixed-lag smoother left them, with the odometry's drift as
-/// it was known when they left the window: from the way behind them.
+/// All keyframes of a log, first as the fixed-lag smoother left them.
 KeyframeWindow CollectKeyframes(const MotionLog& log, const SmootherConfig& config) {
   FixedLagSmoother smoother(config);
   KeyframeWindow all;
-  const auto collect = [&all, &smoother](const Keyframe& keyframe) {
-    Keyframe corrected = keyframe;
-    if (!all.keyframes.empty()) smoother.drift().CorrectAnew(all.keyframes.back(), corrected);
-    all.keyframes.push_back(corrected);
-  };
   smoother.OnLeave([&](const Keyframe& keyframe, std::span<const AttachedFix> fixes) {
-    collect(keyframe);
+    all.keyframes.push_back(keyframe);
     std::copy(fixes.begin(), fixes.end(), std::back_inserter(all.fixes));
   });
   Feed(log, smoother, [](const Fix&) {});
   for (const Keyframe& keyframe : smoother.window().keyframes)
-    collect(keyframe);
+    all.keyframes.push_back(keyframe);
   const auto& fixes = smoother.window().fixes;
   std::copy(fixes.begin(), fixes.end(), std::back_inserter(all.fixes));
-  all.camera = CameraOf(config);
-  all.SetCameraOffset(smoother.camera().estimate);
+  all.systematic = SystematicErrorsOf(config);
+  all.SetSystematicErrors(smoother.systematic_errors().estimate);
   return all;
 }
 
@@ -221,7 +215,7 @@ Fix MakePoseFix(MonotonicTime time, const Pose2& X_WB, const SmootherConfig& con
 
 std::vector<SmootherEstimate> SmoothCausally(const MotionLog& log,
                                              const SmootherConfig& config,
-                                             CameraOffset* camera) {
+                                             SystematicErrors* errors) {
   FixedLagSmoother smoother(config);
   std::vector<SmootherEstimate> estimates;
   estimates.reserve(log.fixes.size());
@@ -230,14 +224,14 @@ std::vector<SmootherEstimate> SmoothCausally(const MotionLog& log,
     none.time = fix.time;
     estimates.push_back(smoother.EstimateAt(fix.time).value_or(none));
   });
-  if (camera != nullptr) *camera = smoother.camera();
+  if (errors != nullptr) *errors = smoother.systematic_errors();
   return estimates;
 }
 
 std::vector<SmootherEstimate> SmoothAll(const MotionLog& log,
                                         const SmootherConfig& config,
-                                        CameraOffset* camera) {
-  if (camera != nullptr) *camera = CameraOf(config);
+                                        SystematicErrors* errors) {
+  if (errors != nullptr) *errors = SystematicErrorsOf(config);
   std::vector<SmootherEstimate> estimates(log.fixes.size());
   for (std::size_t i = 0; i < estimates.size(); ++i)
     estimates[i].time = log.fixes[i].time;
@@ -254,13 +248,13 @@ std::vector<SmootherEstimate> SmoothAll(const MotionLog& log,
   weighting.SetMisfit(misfit.Measure(all, weighting).misfit);
   SolveAll(weighting, consensus_options, all);
   // The whole log's own errors, from estimates that are near enough to the best ones.
-  const FixErrors errors = misfit.Measure(all, weighting);
-  weighting.SetMisfit(errors.misfit);
-  weighting.SetScatter(errors.scatter);
+  const FixErrors fix_errors = misfit.Measure(all, weighting);
+  weighting.SetMisfit(fix_errors.misfit);
+  weighting.SetScatter(fix_errors.scatter);
   SolveBatch(all, weighting, kBatchIterations);
   const std::vector<Eigen::Matrix3d> covariances =
       ChainSolver(all.keyframes.size()).SmoothedCovariances(all, weighting);
-  if (camera != nullptr) *camera = all.camera;
+  if (errors != nullptr) *errors = all.systematic;
   const OdometryLookup odometry(log, all, config);
   for (SmootherEstimate& estimate : estimates) {
     const auto sample = odometry.At(estimate.time);

@@ -31,15 +31,15 @@ Fix MakePoseFix(MonotonicTime time, const Pose2& X_WB, const SmootherConfig& con
 /// For each fix of the log the estimate at its time, from what had arrived by then: the odometry up
 /// to it, and all fixes up to and including it.
 ///
-/// @param camera  set to what is known of it in the end, if wanted.
+/// @param errors  set to what is known of them in the end, if wanted.
 std::vector<SmootherEstimate> SmoothCausally(const MotionLog& log,
                                              const SmootherConfig& config,
-                                             CameraOffset* camera = nullptr);
+                                             SystematicErrors* errors = nullptr);
 
 /// For each fix of the log the estimate at its time from the whole log: the fixed-lag smoother's
 /// result as the start of one solution over all keyframes.
 std::vector<SmootherEstimate> SmoothAll(const MotionLog& log,
                                         const SmootherConfig& config,
-                                        CameraOffset* camera = nullptr);
+                                        SystematicErrors* errors = nullptr);
 
 }  // namespace relocd

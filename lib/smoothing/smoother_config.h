@@ -51,7 +51,7 @@ struct SmootherConfig {
   double cauchy_scale_sigmas = 1.0;
   double gate_squared_mahalanobis = 100.0;
   double fix_correlation_time_s = 0.2;
-  double fix_bias_sigmas = 0.5;
+  double fix_bias_sigmas = 0.55;
   double fix_bias_time_s = 10.0;
   double camera_yaw_sigma_rad = 0.0;
   double camera_time_sigma_s = 0.0;
@@ -60,10 +60,10 @@ struct SmootherConfig {
   double max_extrapolation_s = 0.5;
   double default_fix_sigma_m = 7.0;
   double default_fix_heading_sigma_rad = 0.05;
-  double odometry_covariance_factor = 2.0;
+  double odometry_covariance_factor = 1.4;
   double odometry_drift_sigma_rad_per_m = 0.005;
   double odometry_yaw_rate_sigma_rad_per_s = 0.0;
-  double odometry_scale_sigma = 0.01;
+  double odometry_scale_sigma = 0.02;
   OdometryNoiseConfig default_odometry_noise;
 
   int start_fixes = 3;

@@ -16,6 +16,7 @@ inline Keyframe MakeKeyframe(int i, const Pose2& X_WK, const Pose2& X_PK) {
   keyframe.time = MonotonicTime(std::chrono::seconds(i));
   keyframe.SetX_WK(X_WK);
   keyframe.X_PK = X_PK;
+  keyframe.extent_PK = MotionExtent::Of(X_PK, 1.0);
   keyframe.covariance_PK << 4e-4, 1e-4, 0.0, 1e-4, 2e-4, 1e-5, 0.0, 1e-5, 1e-4;
   return keyframe;
 }

@@ -405,8 +405,8 @@ TEST(FixedLagSmootherTest, LearnsTheOdometrysConstantErrors) {
     FixedLagSmoother smoother{SmootherConfig()};
     const SmootherEstimate estimate = Drive(drive, smoother);
     learning.push_back(PositionError(estimate.X_WB, drive.X_WB_end));
-    EXPECT_NEAR(smoother.drift().rad_per_m(), 0.004, 0.001) << seed;
-    EXPECT_NEAR(smoother.drift().scale(), 0.01, 0.006) << seed;
+    EXPECT_NEAR(smoother.systematic_errors().odometry_rad_per_m(), 0.004, 0.001) << seed;
+    EXPECT_NEAR(smoother.systematic_errors().odometry_scale(), 0.01, 0.006) << seed;
     SmootherConfig config;
     config.odometry_drift_sigma_rad_per_m = 0.0;
     config.odometry_scale_sigma = 0.0;
@@ -417,7 +417,7 @@ TEST(FixedLagSmootherTest, LearnsTheOdometrysConstantErrors) {
 }
 
 /// What a drift of -0.004 rad/s, at 1.5 m/s, is found to be.
-OdometryDrift DriftOfASensorWithABias(const SmootherConfig& config, unsigned seed) {
+SystematicErrors ErrorsOfASensorWithABias(const SmootherConfig& config, unsigned seed) {
   auto drive = DriveSimulator({.duration_s = 300.0, .has_heading = false}, seed).Run();
   std::vector<OdometryStep>& odometry = drive.log.odometry;
   for (std::size_t i = 1; i < odometry.size(); ++i) {
@@ -427,7 +427,7 @@ OdometryDrift DriftOfASensorWithABias(const SmootherConfig& config, unsigned see
   FixedLagSmoother smoother(config);
   const SmootherEstimate estimate = Drive(drive, smoother);
   EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.6) << seed;
-  return smoother.drift();
+  return smoother.systematic_errors();
 }
 
 TEST(FixedLagSmootherTest, LearnsTheBiasOfAYawRateSensor) {
@@ -437,13 +437,13 @@ TEST(FixedLagSmootherTest, LearnsTheBiasOfAYawRateSensor) {
   SmootherConfig both;
   both.odometry_yaw_rate_sigma_rad_per_s = 1.5 * both.odometry_drift_sigma_rad_per_m;
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
-    const OdometryDrift found = DriftOfASensorWithABias(only, seed);
-    EXPECT_NEAR(found.rad_per_s(), 0.004, 0.001) << seed;
-    EXPECT_EQ(found.rad_per_m(), 0.0);
+    const SystematicErrors found = ErrorsOfASensorWithABias(only, seed);
+    EXPECT_NEAR(found.odometry_rad_per_s(), 0.004, 0.001) << seed;
+    EXPECT_EQ(found.odometry_rad_per_m(), 0.0);
     // One speed does not tell them apart: each gets its half.
-    const OdometryDrift shared = DriftOfASensorWithABias(both, seed);
-    EXPECT_NEAR(shared.rad_per_s(), 0.002, 0.0007) << seed;
-    EXPECT_NEAR(shared.rad_per_m(), 0.002 / 1.5, 0.0005) << seed;
+    const SystematicErrors shared = ErrorsOfASensorWithABias(both, seed);
+    EXPECT_NEAR(shared.odometry_rad_per_s(), 0.002, 0.0007) << seed;
+    EXPECT_NEAR(shared.odometry_rad_per_m(), 0.002 / 1.5, 0.0005) << seed;
   }
 }
 
@@ -459,12 +459,15 @@ TEST(FixedLagSmootherTest, DoesNotTurnABodyThatStands) {
     step.time += milliseconds(50);
     ASSERT_TRUE(smoother.AddOdometry(step));
   }
-  EXPECT_NE(smoother.drift().rad_per_s(), 0.0);
+  EXPECT_NE(smoother.systematic_errors().odometry_rad_per_s(), 0.0);
   EXPECT_EQ(smoother.Estimate().X_WB.yaw(), before.X_WB.yaw());
 }
 
-/// A car whose encoders are good, as its covariances say, and whose radii are not.
-SimulatedDrive DriveOfGoodEncodersAndPoorRadii(unsigned seed) {
+/// A car whose encoders are good, as its covariances say, and whose radii are not: they differ, or
+/// all are larger than the config says.
+SimulatedDrive DriveOfGoodEncodersAndPoorRadii(unsigned seed,
+                                               double rad_per_m = 0.007,
+                                               double scale = 1.005) {
   DriveSimulator simulator({.duration_s = 100.0,
                             .fix_rate_hz = 5.0,
                             .speed_mps = 8.0,
@@ -473,23 +476,55 @@ SimulatedDrive DriveOfGoodEncodersAndPoorRadii(unsigned seed) {
                             .has_heading = false},
                            seed);
   SimulatedDrive drive = simulator.Run();
-  Distort(seed % 2 == 0 ? 0.007 : -0.007, 1.005, drive.log.odometry);
+  Distort(seed % 2 == 0 ? rad_per_m : -rad_per_m, scale, drive.log.odometry);
   for (OdometryStep& step : drive.log.odometry)
     step.covariance *= 0.3;
   return drive;
 }
 
-TEST(FixedLagSmootherTest, IsNotLostByWheelsThatTurnMoreThanTheySay) {
-  for (unsigned seed = 0; seed < kSeeds; ++seed) {
-    const SimulatedDrive drive = DriveOfGoodEncodersAndPoorRadii(seed);
-    const auto estimates = SmoothCausally(drive.log, SmootherConfig());
-    std::vector<double> errors;
-    for (std::size_t i = 30; i < estimates.size(); ++i) {
-      EXPECT_NE(estimates[i].status, SmootherStatus::kLost) << seed << ' ' << i;
-      errors.push_back(PositionError(estimates[i].X_WB, drive.truth_at_fixes[i]));
-    }
-    EXPECT_LT(Summarize(errors).rmse, 0.6) << seed;
+void ExpectNeverLost(const SimulatedDrive& drive, double largest_rmse_m, unsigned seed) {
+  const auto estimates = SmoothCausally(drive.log, SmootherConfig());
+  std::vector<double> errors;
+  for (std::size_t i = 30; i < estimates.size(); ++i) {
+    EXPECT_NE(estimates[i].status, SmootherStatus::kLost) << seed << ' ' << i;
+    errors.push_back(PositionError(estimates[i].X_WB, drive.truth_at_fixes[i]));
   }
+  EXPECT_LT(Summarize(errors).rmse, largest_rmse_m) << seed;
+}
+
+TEST(FixedLagSmootherTest, IsNotLostByWheelsThatTurnMoreThanTheySay) {
+  for (unsigned seed = 0; seed < kSeeds; ++seed)
+    ExpectNeverLost(DriveOfGoodEncodersAndPoorRadii(seed), 0.6, seed);
+}
+
+TEST(FixedLagSmootherTest, IsNotLostByWheelsOfAnotherSize) {
+  for (unsigned seed = 0; seed < kSeeds; ++seed)
+    ExpectNeverLost(DriveOfGoodEncodersAndPoorRadii(seed, 0.0, 0.95), 0.7, seed);
+}
+
+TEST(FixedLagSmootherTest, DeadReckoningIsAsUncertainAsTheWheelsAre) {
+  const auto drive = DriveSimulator({.duration_s = 20.0}, 1).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  const SmootherEstimate before = Drive(drive, smoother);
+  const SystematicVector sigmas = smoother.systematic_errors().Sigmas();
+  OdometryStep step = drive.log.odometry.back();
+  step.X_BprevB = Pose2(0.1, 0.0, 0.0);
+  step.covariance = 1e-9 * Eigen::Matrix3d::Identity();
+  for (int i = 0; i < 2000; ++i) {
+    step.time += milliseconds(50);
+    ASSERT_TRUE(smoother.AddOdometry(step));
+  }
+  const SmootherEstimate after = smoother.Estimate();
+  const double way_m = 200.0;
+  EXPECT_GT(sigmas[3], 1e-3);
+  EXPECT_GT(std::sqrt(after.covariance(0, 0)), 0.9 * sigmas[2] * way_m);
+  EXPECT_NEAR(std::sqrt(after.covariance(2, 2) - before.covariance(2, 2)),
+              sigmas[3] * way_m,
+              0.1 * sigmas[3] * way_m);
+  // The turn of each metre has turned the way behind it as well.
+  EXPECT_NEAR(std::sqrt(after.covariance(1, 1)),
+              0.5 * sigmas[3] * way_m * way_m,
+              0.2 * 0.5 * sigmas[3] * way_m * way_m);
 }
 
 TEST(SmoothAllTest, PutsTheOdometryRightFromTheBeginning) {
@@ -530,15 +565,15 @@ TEST(FixedLagSmootherTest, LearnsHowTheCameraIsTurnedAndHowLateItIs) {
     const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), seed).Run();
     FixedLagSmoother smoother(ConfigOfOffsetCamera());
     learning.push_back(PositionError(Drive(drive, smoother).X_WB, drive.X_WB_end));
-    const CameraOffset& camera = smoother.camera();
-    const Eigen::Vector2d sigmas = camera.covariance.diagonal().cwiseSqrt();
+    const SystematicErrors& camera = smoother.systematic_errors();
+    const SystematicVector sigmas = camera.Sigmas();
     EXPECT_LT(sigmas.x(), 0.006);
     EXPECT_LT(sigmas.y(), 0.03);
-    EXPECT_NEAR(camera.estimate.x(), 0.0175, 3.0 * sigmas.x()) << seed;
-    EXPECT_NEAR(camera.estimate.y(), 0.08, 3.0 * sigmas.y()) << seed;
+    EXPECT_NEAR(camera.camera_yaw_rad(), 0.0175, 3.0 * sigmas.x()) << seed;
+    EXPECT_NEAR(camera.camera_time_s(), 0.08, 3.0 * sigmas.y()) << seed;
     FixedLagSmoother other{SmootherConfig()};
     not_learning.push_back(PositionError(Drive(drive, other).X_WB, drive.X_WB_end));
-    EXPECT_EQ(other.camera().estimate, Eigen::Vector2d::Zero());
+    EXPECT_TRUE(CameraPart(other.systematic_errors().estimate).isZero(0.0));
   }
   std::cout << "position: rmse " << Summarize(learning).rmse << " m, not learning "
             << Summarize(not_learning).rmse << " m\n";
@@ -551,9 +586,9 @@ TEST(FixedLagSmootherTest, KnowsThatAStraightRoadDoesNotTellHowLateTheCameraIs) 
     const auto drive = DriveSimulator(DriveWithOffsetCamera(0.0), seed).Run();
     FixedLagSmoother smoother(ConfigOfOffsetCamera());
     const SmootherEstimate estimate = Drive(drive, smoother);
-    const double sigma_s = std::sqrt(smoother.camera().covariance(1, 1));
+    const double sigma_s = std::sqrt(smoother.systematic_errors().covariance(1, 1));
     EXPECT_GT(sigma_s, 0.08) << seed;
-    EXPECT_NEAR(smoother.camera().estimate.y(), 0.08, 3.0 * sigma_s) << seed;
+    EXPECT_NEAR(smoother.systematic_errors().camera_time_s(), 0.08, 3.0 * sigma_s) << seed;
     // What that may be on the road is part of the covariance.
     EXPECT_GT(std::sqrt(estimate.covariance(0, 0)), 0.9 * 6.0 * sigma_s) << seed;
   }
@@ -565,8 +600,8 @@ TEST(FixedLagSmootherTest, PositionsDoNotTellHowTheCameraIsTurned) {
   const auto drive = DriveSimulator(options, 1).Run();
   FixedLagSmoother smoother(ConfigOfOffsetCamera());
   Drive(drive, smoother);
-  EXPECT_NEAR(smoother.camera().estimate.x(), 0.0, 1e-9);
-  EXPECT_NEAR(smoother.camera().covariance(0, 0), 0.05 * 0.05, 1e-9);
+  EXPECT_NEAR(smoother.systematic_errors().camera_yaw_rad(), 0.0, 1e-9);
+  EXPECT_NEAR(smoother.systematic_errors().covariance(0, 0), 0.05 * 0.05, 1e-9);
 }
 
 /// A camera at the front that looks to the left has the body turned about the camera: its middle to
@@ -585,9 +620,9 @@ TEST(FixedLagSmootherTest, ATurnedCameraMovesTheBodyAboutTheCamera) {
   config.camera_yaw_sigma_rad = 0.05;
   FixedLagSmoother smoother(config);
   const SmootherEstimate estimate = Drive(drive, smoother);
-  const double sigma = std::sqrt(smoother.camera().covariance(0, 0));
+  const double sigma = std::sqrt(smoother.systematic_errors().covariance(0, 0));
   EXPECT_LT(sigma, 0.01);
-  EXPECT_NEAR(smoother.camera().estimate.x(), turn, 3.0 * sigma);
+  EXPECT_NEAR(smoother.systematic_errors().camera_yaw_rad(), turn, 3.0 * sigma);
   EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.3);
 }
 
@@ -605,7 +640,7 @@ TEST(FixedLagSmootherTest, AJumpOfTheOdometryDoesNotSpoilWhatIsKnownOfTheCamera)
   const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), 1).Run();
   FixedLagSmoother smoother(ConfigOfOffsetCamera());
   Drive(drive, smoother);
-  const double before = smoother.camera().estimate.y();
+  const double before = smoother.systematic_errors().camera_time_s();
   OdometryStep jump = drive.log.odometry.back();
   Fix fix = drive.log.fixes.back();
   for (const double length : {1e3, 1e7, 1e150}) {
@@ -614,10 +649,10 @@ TEST(FixedLagSmootherTest, AJumpOfTheOdometryDoesNotSpoilWhatIsKnownOfTheCamera)
     EXPECT_EQ(smoother.AddOdometry(jump).has_value(), length < 1e8);
     fix.time = jump.time;
     smoother.AddFix(fix);
-    EXPECT_TRUE(smoother.camera().covariance.allFinite());
+    EXPECT_TRUE(smoother.systematic_errors().covariance.allFinite());
     EXPECT_TRUE(smoother.Estimate().X_WB.translation().allFinite());
   }
-  EXPECT_NEAR(smoother.camera().estimate.y(), before, 0.02);
+  EXPECT_NEAR(smoother.systematic_errors().camera_time_s(), before, 0.02);
 }
 
 TEST(FixedLagSmootherTest, SaysHowFarItKnowsItsPose) {
@@ -683,16 +718,16 @@ TEST(FixedLagSmootherTest, AResetIsAboutThisMoment) {
 
 TEST(SmoothAllTest, FindsTheCamerasOffset) {
   const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), 2).Run();
-  CameraOffset causal;
-  CameraOffset smoothed;
+  SystematicErrors causal;
+  SystematicErrors smoothed;
   SmoothCausally(drive.log, ConfigOfOffsetCamera(), &causal);
   SmoothAll(drive.log, ConfigOfOffsetCamera(), &smoothed);
-  const Eigen::Vector2d sigmas = smoothed.covariance.diagonal().cwiseSqrt();
+  const SystematicVector sigmas = smoothed.Sigmas();
   EXPECT_LT(sigmas.x(), 0.006);
   EXPECT_LT(sigmas.y(), 0.03);
-  EXPECT_NEAR(smoothed.estimate.x(), 0.0175, 3.0 * sigmas.x());
-  EXPECT_NEAR(smoothed.estimate.y(), 0.08, 3.0 * sigmas.y());
-  EXPECT_NEAR(causal.estimate.y(), smoothed.estimate.y(), 2.0 * sigmas.y());
+  EXPECT_NEAR(smoothed.camera_yaw_rad(), 0.0175, 3.0 * sigmas.x());
+  EXPECT_NEAR(smoothed.camera_time_s(), 0.08, 3.0 * sigmas.y());
+  EXPECT_NEAR(causal.camera_time_s(), smoothed.camera_time_s(), 2.0 * sigmas.y());
 }
 
 TEST(SmoothAllTest, BeatsTheCausalEstimate) {
