@@ -365,6 +365,7 @@ void DropOutliers(std::vector<FrontBlock>& blocks) {
   constexpr double kSigmaOfMedian = 1.4826;  // of a normal distribution
   for (Eigen::Index side = 0; side < 2; ++side) {
     std::vector<double> ratios;
+    ratios.reserve(blocks.size());
     for (const FrontBlock& block : blocks)
       ratios.push_back(block.Ratio()[side]);
     const double median = Median(ratios);

@@ -22,6 +22,14 @@ double Square(double value) {
   return value * value;
 }
 
+double SteeringTangent(const CarMeasurement& measured) {
+  return std::tan(std::clamp(*measured.steering_rad, -1.4, 1.4));
+}
+
+double SteeredCurvature(const DifferentialDriveConfig& drive, const CarMeasurement& measured) {
+  return SteeringTangent(measured) / drive.wheelbase_m;
+}
+
 /// What one measurement says of (forward, turn), to first order.
 struct Equation {
   Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
@@ -93,15 +101,10 @@ class Equations {
   }
 
   void AddSteering() {
-    const double tangent = std::tan(std::clamp(*measured_.steering_rad, -1.4, 1.4));
-    const double curvature_per_m = tangent / drive_.wheelbase_m;
-    const double slope = (1.0 + Square(tangent)) / drive_.wheelbase_m;
-    // The angle's error lasts for about a metre, so that over less it is not averaged.
-    const double effective_m2 = std::abs(forward_m_) * std::max(std::abs(forward_m_), 1.0);
-    Add({.gradient = {-curvature_per_m, 1.0},
-         .residual = curvature_per_m * forward_m_ - turn_rad_,
-         .variance =
-             Square(slope * measured_.steering_sigma_rad) * effective_m2 + kLeastTurnVariance});
+    const TurnMeasurement turn = TurnBySteering(drive_, measured_, forward_m_);
+    Add({.gradient = {-SteeredCurvature(drive_, measured_), 1.0},
+         .residual = turn.turn_rad - turn_rad_,
+         .variance = turn.variance_rad2});
   }
 
   const DifferentialDriveConfig& drive_;
@@ -113,6 +116,17 @@ class Equations {
 };
 
 }  // namespace
+
+TurnMeasurement TurnBySteering(const DifferentialDriveConfig& drive,
+                               const CarMeasurement& measured,
+                               double forward_m) {
+  const double slope = (1.0 + Square(SteeringTangent(measured))) / drive.wheelbase_m;
+  // The angle's error lasts for about a metre, so that over less it is not averaged.
+  const double effective_m2 = std::abs(forward_m) * std::max(std::abs(forward_m), 1.0);
+  return {.turn_rad = SteeredCurvature(drive, measured) * forward_m,
+          .variance_rad2 =
+              Square(slope * measured.steering_sigma_rad) * effective_m2 + kLeastTurnVariance};
+}
 
 BodyTravel SolveCarTravel(const DifferentialDriveConfig& drive, const CarMeasurement& measured) {
   const Eigen::Vector2d& rear_m = measured.rear.travel_m;

@@ -28,6 +28,11 @@ struct BodyTravel {
   double worst_residual = 0.0;
 };
 
+/// How far the body turned by the steering, if it went `forward_m`.
+TurnMeasurement TurnBySteering(const DifferentialDriveConfig& drive,
+                               const CarMeasurement& measured,
+                               double forward_m);
+
 /// The least squares of all measurements under the rolling condition: no wheel moves sideways, and
 /// the rear axle's middle is the body's origin. Measurements further off than their noise explains
 /// count less (Huber).

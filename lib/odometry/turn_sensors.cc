@@ -114,6 +114,20 @@ void YawRateSensor::Restart() {
   bias_variance_ = bias_variance;
 }
 
+double YawRateSensor::RateVariance() const {
+  return Square(config_.noise_rad_per_sqrt_s) / last_duration_s_ + Square(resolution_radps_) / 12.0;
+}
+
+bool YawRateSensor::IsUnlikeBias(double deviations) const {
+  return last_rate_radps_ && Square(*last_rate_radps_ - bias_radps_) >
+                                 Square(deviations) * (bias_variance_ + RateVariance());
+}
+
+void YawRateSensor::DoubtBias() {
+  if (last_rate_radps_)
+    bias_variance_ = std::max(bias_variance_, Square(*last_rate_radps_ - bias_radps_));
+}
+
 void YawRateSensor::LearnBias() {
   if (!last_rate_radps_ || last_duration_s_ <= 0.0) return;
   const double variance = Square(config_.noise_rad_per_sqrt_s) / last_duration_s_;

@@ -95,13 +95,23 @@ class YawRateSensor {
   /// Times go on elsewhere, as after a jump of the clock: forgets all but the bias.
   void Restart();
 
-  /// The wheels stood in the interval of the last TurnTo.
+  /// Whether the rate over the interval of the last TurnTo is further from the bias than so many
+  /// standard deviations of both.
+  [[nodiscard]] bool IsUnlikeBias(double deviations) const;
+
+  /// The wheels stood in that interval.
   void LearnBias();
+
+  /// The bias may be what the rate is, however well it was known.
+  void DoubtBias();
 
   [[nodiscard]] double bias_radps() const { return bias_radps_; }
   [[nodiscard]] double bias_variance() const { return bias_variance_; }
 
  private:
+  /// Of the rate over the interval of the last TurnTo.
+  [[nodiscard]] double RateVariance() const;
+
   YawRateConfig config_;
   double resolution_radps_;
   Duration max_age_;

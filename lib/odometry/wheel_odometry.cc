@@ -18,6 +18,9 @@ constexpr double kAxleDifference = 0.5;  // m/s
 /// measurements that are not of the same time.
 constexpr double kAgreementS = 0.5;
 constexpr double kAgreementRad = 0.01;
+/// For so long a body may turn though its wheels seem to stand: they creep below what their sensors
+/// see, or it is carried. A yaw rate that goes on is a bias that has changed.
+constexpr double kUnseenTurnS = 30.0;
 /// So many sets of measurements in a row that are older than the last one, but rise: the clock has
 /// jumped back, or the last one was of a wrong time.
 constexpr int kOldAreNew = 100;
@@ -231,10 +234,8 @@ std::optional<OdometryIncrement> WheelOdometry::Accept(const WheelSample& sample
   const CarMeasurement measured = Measurement(sample, travel, turn);
   const bool disagrees = Disagrees(measured);
   if (IsSlipping(sample, travel) || disagrees) flags |= kOdometrySlip;
-  if (UpdateStandstill(sample, travel)) {
+  if (UpdateStandstill(sample, travel) && IsStandstill(sample, disagrees))
     flags |= kOdometryStandstill;
-    if (yaw_rate_) yaw_rate_->LearnBias();
-  }
   if ((flags & kOdometryGap) != 0) ++counters_.gaps;
   if ((flags & kOdometrySlip) != 0) ++counters_.slips;
 
@@ -388,7 +389,8 @@ bool WheelOdometry::IsSlipping(const WheelSample& sample, const WheelTravel& tra
   if (anchor_->has_speeds && change > config_.max_acceleration_mps2 * interval_s) return true;
 
   if (!signals_.has_front()) return false;
-  const double front = 0.5 * (sample.front_speeds_mps[0] + sample.front_speeds_mps[1]);
+  const double front = 0.5 * (config_.drive.front_left_scale * sample.front_speeds_mps[0] +
+                              config_.drive.front_right_scale * sample.front_speeds_mps[1]);
   const double rear = speeds_mps.mean();
   const double faster = std::max(std::abs(front), std::abs(rear));
   return std::abs(front - rear) > config_.max_axle_difference * faster + kAxleDifference;
@@ -409,18 +411,20 @@ CarMeasurement WheelOdometry::Measurement(const WheelSample& sample,
 }
 
 bool WheelOdometry::Disagrees(const CarMeasurement& measured) {
-  if (measured.turn) {
-    const DifferentialDriveConfig& drive = config_.drive;
-    const WheelTravel& rear = measured.rear;
+  const DifferentialDriveConfig& drive = config_.drive;
+  const WheelTravel& rear = measured.rear;
+  std::optional<TurnMeasurement> turn = measured.turn;
+  if (!turn && measured.steering_rad) turn = TurnBySteering(drive, measured, rear.travel_m.mean());
+  if (turn) {
     const double wheels_rad = BodyTwist(drive.track_m, rear.travel_m).z();
     const double wheels_variance =
         (Square(drive.wheel_sigma_m_per_sqrt_m) * rear.travel_m.cwiseAbs() + rear.variance_m2)
             .sum() /
         Square(drive.track_m);
     const double kept = std::exp(-rear.duration_s / kAgreementS);
-    disagreement_rad_ = kept * disagreement_rad_ + wheels_rad - measured.turn->turn_rad;
+    disagreement_rad_ = kept * disagreement_rad_ + wheels_rad - turn->turn_rad;
     disagreement_variance_ =
-        Square(kept) * disagreement_variance_ + wheels_variance + measured.turn->variance_rad2;
+        Square(kept) * disagreement_variance_ + wheels_variance + turn->variance_rad2;
     const double allowed_rad =
         config_.max_deviation_sigma * std::sqrt(disagreement_variance_) + kAgreementRad;
     if (std::abs(disagreement_rad_) > allowed_rad) return true;
@@ -467,6 +471,16 @@ bool WheelOdometry::UpdateStandstill(const WheelSample& sample, const WheelTrave
   }
   if (!still_since_) still_since_ = anchor_->sample.time;
   return sample.time - *still_since_ >= FromSeconds(config_.standstill_after_s);
+}
+
+bool WheelOdometry::IsStandstill(const WheelSample& sample, bool disagrees) {
+  if (!yaw_rate_) return true;
+  if (disagrees || yaw_rate_->IsUnlikeBias(config_.max_deviation_sigma)) {
+    if (sample.time - *still_since_ < FromSeconds(kUnseenTurnS)) return false;
+    yaw_rate_->DoubtBias();
+  }
+  yaw_rate_->LearnBias();
+  return true;
 }
 
 Eigen::Vector2d WheelOdometry::ScaledSpeeds(const WheelSample& sample) const {

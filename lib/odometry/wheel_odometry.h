@@ -208,9 +208,11 @@ class WheelOdometry {
   [[nodiscard]] CarMeasurement Measurement(const WheelSample& sample,
                                            const WheelTravel& travel,
                                            const std::optional<TurnMeasurement>& turn) const;
-  /// Whether the wheels contradict the yaw rate, or each other.
+  /// Whether the wheels contradict the yaw rate, the steering, or each other.
   bool Disagrees(const CarMeasurement& measured);
   bool UpdateStandstill(const WheelSample& sample, const WheelTravel& travel);
+  /// Whether a body whose wheels stand does so, too; learns the yaw rate's bias if it does.
+  bool IsStandstill(const WheelSample& sample, bool disagrees);
 
   [[nodiscard]] Eigen::Vector2d ScaledSpeeds(const WheelSample& sample) const;
   [[nodiscard]] Eigen::Vector2d SpeedsAt(const WheelSample& sample,
@@ -229,7 +231,8 @@ class WheelOdometry {
   std::optional<SignalReader> yaw_rate_signal_;
   std::optional<YawRateSensor> yaw_rate_;
   std::optional<std::pair<MonotonicTime, double>> last_yaw_rate_;
-  /// Turn by the wheels less that by the yaw rate, over the last half second, and its variance.
+  /// Turn by the wheels less that by the yaw rate, or by the steering, over the last half second,
+  /// and its variance.
   double disagreement_rad_ = 0.0;
   double disagreement_variance_ = 0.0;
   std::optional<WheelSample> last_sample_;

@@ -408,6 +408,16 @@ TEST_F(WheelSpeedOdometryTest, FlagsAxlesThatContradictEachOther) {
   EXPECT_EQ(slipping->flags, kOdometrySlip);
 }
 
+TEST_F(WheelSpeedOdometryTest, ComparesAxlesByTheirScales) {
+  OdometryConfig config = SpeedConfig();
+  config.drive.front_left_scale = config.drive.front_right_scale = -0.5;
+  odometry_ = WheelOdometry::Create(config, dbc_).value();
+  Send(0.0, 3.0, -6.0);
+  const auto regular = Send(0.1, 3.0, -6.0);
+  ASSERT_TRUE(regular);
+  EXPECT_EQ(regular->flags, 0);
+}
+
 TEST_F(WheelSpeedOdometryTest, FlagsStandstillOfCreepingReadings) {
   Send(0.0, 0.01, 0.0);
   Send(0.1, 0.0, 0.0);
@@ -465,6 +475,15 @@ class CarTest {
             speed_mps + half_m * yaw_rate_radps + spin_mps,
             std::hypot(speed_mps - half_m * yaw_rate_radps, across),
             std::hypot(speed_mps + half_m * yaw_rate_radps, across)});
+    }
+  }
+
+  /// The body turns, and no wheel shows it.
+  void TurnUnseen(double yaw_rate_radps, double duration_s) {
+    for (int i = 0; i < static_cast<int>(std::lround(duration_s * 100.0)); ++i) {
+      time_ns_ += kPeriodNs;
+      Send("INERTIAL", {yaw_rate_radps + kBias});
+      Send("SPEEDS", {0.0, 0.0, 0.0, 0.0});
     }
   }
 
@@ -533,6 +552,26 @@ TEST(CarYawRateTest, LearnsTheBiasWhileItStandsAndFollows) {
   EXPECT_LT(car.Error()[1], 0.01);
 }
 
+/// As a car that creeps slower than its wheels' sensors see.
+TEST(CarYawRateTest, DoesNotTakeATurnForItsBias) {
+  CarTest car(WithYawRate(CarConfig("differential")));
+  car.Drive(0.0, 0.0, 3.0);
+  car.TurnUnseen(0.1, 5.0);
+  EXPECT_NEAR(car.odometry().yaw_rate_bias_radps().value(), CarTest::kBias, 2e-3);
+  EXPECT_EQ(car.last().flags, kOdometrySlip);
+  car.Drive(0.0, 0.0, 3.0);
+  EXPECT_NEAR(car.odometry().yaw_rate_bias_radps().value(), CarTest::kBias, 5e-4);
+  EXPECT_EQ(car.last().flags, kOdometryStandstill);
+}
+
+TEST(CarYawRateTest, LearnsABiasThatHasChanged) {
+  CarTest car(WithYawRate(CarConfig("differential")));
+  car.Drive(0.0, 0.0, 3.0);
+  car.TurnUnseen(0.1, 35.0);
+  EXPECT_NEAR(car.odometry().yaw_rate_bias_radps().value(), CarTest::kBias + 0.1, 1e-3);
+  EXPECT_EQ(car.last().flags, kOdometryStandstill);
+}
+
 TEST(CarYawRateTest, KeepsItsBiasWhenTheClockJumpsBack) {
   CarTest car(WithYawRate(CarConfig("differential")));
   car.Drive(0.0, 0.0, 10.0);
@@ -561,6 +600,16 @@ TEST(CarYawRateTest, FlagsAWheelThatSpinsAndKeepsTheHeading) {
   EXPECT_EQ(alone[1], 0.0);
   EXPECT_LT(fused[0], 0.04);
   EXPECT_GT(fused[1], 30.0);
+}
+
+TEST(CarSteeringTest, FlagsARearWheelThatSpins) {
+  OdometryConfig config = CarConfig("ackermann");
+  config.wheels.front_left_signal = config.wheels.front_right_signal = "";
+  CarTest car(config);
+  car.Drive(2.0, 0.2, 2.0);
+  EXPECT_EQ(car.odometry().counters().slips, 0);
+  car.Drive(2.0, 0.2, 1.0, 0.5);
+  EXPECT_GT(car.odometry().counters().slips, 50);
 }
 
 TEST(CarFourWheelTest, KeepsTheHeadingWhenOneWheelSpins) {
