@@ -25,17 +25,18 @@ struct Options {
   std::string out;
   std::string config;
   std::vector<std::string> overrides;
+  std::string window_keyframes;
   bool smoothed = false;
 };
 
 Result<SmootherConfig> ReadConfig(const Options& options) {
-  Config config;
-  if (!options.config.empty()) {
-    auto loaded = LoadConfig(options.config, options.overrides);
-    if (!loaded) return std::move(loaded).error();
-    config = std::move(loaded).value();
+  std::vector<std::string> overrides = options.overrides;
+  if (!options.window_keyframes.empty()) {
+    overrides.push_back("localization.smoother.window_keyframes=" + options.window_keyframes);
   }
-  return config.localization.smoother;
+  const auto config = LoadConfig(options.config, overrides);
+  if (!config) return config.error();
+  return config->localization.smoother;
 }
 
 void ReportOdometry(const SystematicErrors& errors) {
@@ -109,11 +110,15 @@ int main(int argc, char** argv) {
   app.add_flag("--smoothed",
                options.smoothed,
                "each row from the whole log; else from what had arrived by then");
-  auto* config = app.add_option(
+  app.add_option("--window",
+                 options.window_keyframes,
+                 "poses kept and re-estimated, instead of the config's window_keyframes");
+  app.add_option(
       "--config", options.config, "the robot's YAML file: localization; else the defaults");
-  app.add_option("--set", options.overrides, "section.key=value, put over the file's")
-      ->allow_extra_args(false)
-      ->needs(config);
+  app.add_option("--set",
+                 options.overrides,
+                 "section.key=value, put over the config's: as localization.smoother.ok_sigma_m=1")
+      ->allow_extra_args(false);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

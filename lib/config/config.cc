@@ -106,7 +106,7 @@ Result<void> Config::Validate() const {
 }
 
 Result<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides) {
-  auto text = ReadFile(path);
+  auto text = path.empty() ? Result<std::string>(std::string()) : ReadFile(path);
   if (!text) return std::move(text).error();
   Config config;
   auto lines = YamlReader::ReadText(*text, path, overrides, config);

@@ -30,7 +30,9 @@ Result<void> ApplyOverride(const std::string& text, const YAML::Node& root) {
     const std::string key(keys.substr(0, dot));
     if (dot == std::string_view::npos) {
       const std::string value = text.substr(equals + 1);
-      node[key] = value.empty() ? YAML::Node("") : YAML::Load(value);
+      const YAML::Node parsed = value.empty() ? YAML::Node("") : YAML::Load(value);
+      // As a node of its own it is in no line, and an error in it is not said to be in the file's.
+      node[key] = parsed.IsScalar() ? YAML::Node(parsed.Scalar()) : parsed;
       return {};
     }
     if (!node[key].IsDefined() || node[key].IsNull()) node[key] = YAML::Node(YAML::NodeType::Map);
@@ -144,7 +146,7 @@ void YamlReader::Fail(const YAML::Node& node, const std::string& key, const std:
 }
 
 std::string YamlReader::Where(const YAML::Node& node) const {
-  if (node.Mark().line < 0) return fmt::format("{}: --set", path_);
+  if (node.Mark().line < 0) return path_.empty() ? "--set" : fmt::format("{}: --set", path_);
   return fmt::format("{}: line {}", path_, node.Mark().line + 1);
 }
 

@@ -57,6 +57,22 @@ TEST_F(ConfigTest, NamesAnOverrideOutOfRange) {
   EXPECT_EQ(config.error().message, "--set: recorder.flush_s is 0, must be in (0, 60]");
 }
 
+TEST_F(ConfigTest, AnOverrideOfAnotherKindIsInNoLineOfTheFile) {
+  const auto config = Load("", {"recorder.flush_s=soon"});
+  ASSERT_FALSE(config);
+  EXPECT_EQ(config.error().message,
+            path_ + ": --set: recorder.flush_s is 'soon', must be a number");
+}
+
+TEST_F(ConfigTest, WithoutAFileOverridesAreOfTheDefaults) {
+  const auto config = LoadConfig("", {"recorder.flush_s=2.5"});
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->recorder.flush_s, 2.5);
+  EXPECT_EQ(config->localization.smoother.window_keyframes, SmootherConfig().window_keyframes);
+  EXPECT_EQ(LoadConfig("", {"recorder.flush_s=soon"}).error().message,
+            "--set: recorder.flush_s is 'soon', must be a number");
+}
+
 TEST_F(ConfigTest, RefusesNetworksThatWouldHearEachOther) {
   const auto config = Load("bus:\n  image_url: udpm://239.1.1.1:7667?ttl=0\n");
   ASSERT_FALSE(config);

@@ -321,6 +321,7 @@ def messages():
     smooth = [reloc, "smooth", "--out", out / "est.csv", "--odometry"]
     odometry_csv = write("odometry.csv", "time_ns,dx_m,dy_m,dtheta_rad\n0,0,0,0\n100,1,0,0\n")
     fixes = "time_ns,x_m,y_m\n"
+    expect_refusal(78, r"window_keyframes is 1, must be in \[2, 5000\]", *smooth, odometry_csv, "--fixes", write("fixes.csv", fixes + "0,0,0\n"), "--window", "1")
     expect_refusal(78, r"header.csv: line 1: the header has no column 'x_m'", *smooth, odometry_csv, "--fixes", write("header.csv", "time_ns,x,y\n0,0,0\n"))
     expect_refusal(78, r"nan.csv: line 3: x_m is 'nan'", *smooth, odometry_csv, "--fixes", write("nan.csv", fixes + "0,0,0\n50,nan,0\n"))
     expect_refusal(78, r"order.csv: line 3", *smooth, write("order.csv", "time_ns,dx_m,dy_m,dtheta_rad\n100,0,0,0\n50,1,0,0\n"), "--fixes",
