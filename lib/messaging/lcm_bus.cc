@@ -5,11 +5,13 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <chrono>
 #include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>
 
+#include "core/time.h"
 #include "core/unique_fd.h"
 
 namespace relocd {
@@ -17,8 +19,9 @@ namespace {
 
 /// LCM's own default of 30 drops what comes while a daemon works on one image.
 constexpr int kQueueCapacity = 1024;
-/// So that a flood on one channel does not keep an event loop from its other inputs.
-constexpr int kMaxMessagesAtOnce = 4096;
+/// So that messages that come as fast as they are handled do not keep an event loop from its other
+/// inputs, and the watchdog from a sign of life.
+constexpr Duration kLongestTurn = std::chrono::milliseconds(100);
 
 /// Whether a datagram to the url's multicast group would find a way out. LCM itself only prints
 /// "connect: ...".
@@ -106,9 +109,12 @@ void LcmBus::OnMessage(const lcm_recv_buf_t* buffer, const char* channel, void* 
 }
 
 int LcmBus::HandlePending() {
+  const MonotonicTime end = MonotonicClock::now() + kLongestTurn;
   int handled = 0;
-  while (handled<kMaxMessagesAtOnce&& ::lcm_handle_timeout(lcm_, 0)> 0)
+  while (::lcm_handle_timeout(lcm_, 0) > 0) {
     ++handled;
+    if (MonotonicClock::now() >= end) break;
+  }
   HandOnNewest();
   return handled;
 }

@@ -87,7 +87,8 @@ class MessageBus {
   /// @param pattern  a channel's name, or a prefix followed by `.*`.
   void SubscribeRaw(const std::string& pattern, RawHandler handler);
 
-  /// Hands on every message that waits, and does not block. @return how many there were.
+  /// Hands on the messages that wait, and does not block. What comes as fast as it is handled may
+  /// be left for the next call. @return how many were handed on.
   virtual int HandlePending() = 0;
 
   /// To be watched for readability by an event loop; -1 for a bus that has no use of it.

@@ -4,6 +4,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <chrono>
 #include <string>
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 
+#include "core/time.h"
 #include "core/unique_fd.h"
 #include "support/temporary_folder.h"
 
@@ -54,6 +56,24 @@ TEST(LcmBusTest, SaysThatItCannotListenWhereAnotherProgramHasThePort) {
   ASSERT_FALSE(listens);
   EXPECT_EQ(listens.error().kind, ErrorKind::kUnavailable);
   EXPECT_THAT(listens.error().message, HasSubstr("listening at '" + url + "': LCM cannot"));
+}
+
+TEST(LcmBusTest, MessagesThatComeAsFastAsTheyAreHandledDoNotKeepTheCaller) {
+  auto bus = LcmBus::Open("memq://");
+  ASSERT_TRUE(bus);
+  const pose_t pose{};
+  (*bus)->Subscribe<pose_t>(channels::kPose, Delivery::kEvery, [&](const pose_t& /*pose*/) {
+    const MonotonicTime end = MonotonicClock::now() + std::chrono::milliseconds(1);
+    while (MonotonicClock::now() < end) {
+    }
+    EXPECT_TRUE((*bus)->Publish(channels::kPose, pose));
+  });
+  ASSERT_TRUE((*bus)->Publish(channels::kPose, pose));
+  const MonotonicTime begin = MonotonicClock::now();
+  const int handled = (*bus)->HandlePending();
+  EXPECT_LT(MonotonicClock::now() - begin, std::chrono::seconds(2));
+  EXPECT_GT(handled, 0);
+  EXPECT_GT((*bus)->HandlePending(), 0) << "what was left waits for the next turn";
 }
 
 TEST(LcmBusTest, RefusesAProviderThatIsNone) {
