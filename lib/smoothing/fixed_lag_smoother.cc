@@ -13,6 +13,7 @@
 #include "geometry/angle.h"
 #include "geometry/covariance.h"
 #include "smoothing/motion_covariance.h"
+#include "smoothing/odometry_break.h"
 
 namespace relocd {
 namespace {
@@ -428,7 +429,7 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
   } else {
     ++counters_.fixes_redundant;
   }
-  TryRelocalize();
+  if (!TryMend()) TryRelocalize();
   return outcome;
 }
 
@@ -519,6 +520,18 @@ bool FixedLagSmoother::IsSupported(const Voter& voter) const {
                          ? window_.Get(voter.keyframe_id).X_WK() * voter.X_KF
                          : X_WO() * voter.fix.X_OB;
   return Supports(voter.fix, X_WB, consensus_options_);
+}
+
+bool FixedLagSmoother::TryMend() {
+  const auto found = FindOdometryBreak(window_, consensus_options_);
+  if (!found) return false;
+  ++counters_.relocalizations;
+  agreements_since_start_ = 0;
+  MendOdometryBreak(*found, window_);
+  UpdateAllShares(window_, config_.fix_correlation_time_s);
+  chain_.Invalidate();
+  SolveWindow(kStartIterations);
+  return true;
 }
 
 bool FixedLagSmoother::TryRelocalize() {

@@ -150,6 +150,7 @@ class FixedLagSmoother {
   void NoteSupport(const OdometrySample& sample);
 
   void TryStart();
+  bool TryMend();
   bool TryRelocalize();
   void Relocalize(const Pose2& X_WO, std::span<const ConsensusFix> voters);
   void Reseed(const Pose2& X_WO);
