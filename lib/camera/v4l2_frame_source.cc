@@ -88,7 +88,10 @@ void V4l2FrameSource::Lose(const std::string& why, MonotonicTime now) {
   remark_.clear();
   wake_up_ = now + kReopenPeriod;
   gap_ = gap_ || counters_.delivered > 0;
-  if (!lost_since_) lost_since_ = now;
+  if (!lost_since_) {
+    lost_since_ = now;
+    lost_because_ = why;
+  }
   problem_ = why;
 }
 
@@ -222,7 +225,9 @@ void V4l2FrameSource::NoteDelivery(MonotonicTime now) {
                                    FrameRateText(format, config_.frame_rate_hz));
   if (lost_since_) {
     ++counters_.reopened;
-    notice += fmt::format(", back after {:.1f} s ({})", ToSeconds(now - *lost_since_), problem_);
+    notice +=
+        fmt::format(", back after {:.1f} s ({}", ToSeconds(now - *lost_since_), lost_because_);
+    notice += problem_ == lost_because_ ? ")" : "; " + problem_ + ")";
   }
   notices_.push_back(std::move(notice));
   lost_since_.reset();

@@ -51,6 +51,7 @@ class V4l2FrameSource final : public FrameSource {
   bool gap_ = false;        ///< Frames before the next one were lost.
   bool restarted_ = false;  ///< The stream was restarted, and no frame came since.
   std::optional<MonotonicTime> lost_since_;
+  std::string lost_because_;  ///< The first reason; problem_ is the last.
   std::string said_of_controls_;
 };
 

@@ -337,6 +337,9 @@ TEST_F(V4l2FrameSourceTest, SurvivesBeingUnplugged) {
   EXPECT_EQ(frame->flags, kFrameAfterGap);
   EXPECT_EQ(source.counters().reopened, 1);
   EXPECT_EQ(source.problem(), "");
+  EXPECT_THAT(source.TakeNotices().back(),
+              HasSubstr("s (" + kDevice + ": fetching a frame: No such device; " + kDevice +
+                        ": opening: No such file or directory)"));
   EXPECT_EQ(camera_.open_fds, 1);
 }
 
