@@ -28,8 +28,7 @@ CameraNode::CameraNode(const std::string& camera,
       run_id_(run_id) {}
 
 void CameraNode::HandleSource(const ClockReading& now) {
-  while (auto frame = source_.Next(now.monotonic))
-    Publish(*std::move(frame), now);
+  if (auto frame = source_.Next(now.monotonic)) Publish(*std::move(frame), now);
   while (!published_.empty() && published_.front() < now.monotonic - kRateWindow)
     published_.pop_front();
 }

@@ -31,7 +31,9 @@ class CameraNode {
              MessageBus& bus,
              std::int64_t run_id);
 
-  /// Publishes all frames that wait. To be called when the source asks for it.
+  /// Publishes the oldest frame that waits. To be called whenever the source asks for it: one at a
+  /// time, so that a camera that gives frames faster than they are encoded does not keep the loop,
+  /// and each is stamped by the time it was fetched at.
   void HandleSource(const ClockReading& now);
 
   [[nodiscard]] NodeStatus Status(const ClockReading& now) const;

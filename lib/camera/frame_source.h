@@ -55,7 +55,7 @@ struct FrameCounters {
 };
 
 /// Where images come from: a camera, or a recording. It never waits: its user does, for `fd()` to
-/// be readable or for `NextWakeUp()`, and then calls Next until it gives nothing.
+/// be readable or for `NextWakeUp()`, and then calls Next.
 ///
 /// Thread-bound.
 class FrameSource {

@@ -89,6 +89,11 @@ class CameraNodeTest : public testing::Test {
             .exposure_us = 8000};
   }
 
+  void HandleFrames(int count) {
+    for (int i = 0; i < count; ++i)
+      node_.HandleSource(now_);
+  }
+
   InProcessBus bus_;
   FakeSource source_;
   CameraNode node_{"front", Config(), source_, bus_, kRunId};
@@ -118,10 +123,17 @@ TEST_F(CameraNodeTest, PublishesAFrameWithTheTimeItWasTaken) {
                            .exposure_us = 8000}));
 }
 
+TEST_F(CameraNodeTest, PublishesOneFrameAtATimeSoThatTheLoopGoesOn) {
+  source_.frames = {MakeFrame(milliseconds(70)), MakeFrame(milliseconds(35))};
+  node_.HandleSource(now_);
+  bus_.HandlePending();
+  EXPECT_EQ(images_.size(), 1U);
+}
+
 TEST_F(CameraNodeTest, CountsItsMessagesWithoutGaps) {
   for (int i = 0; i < 3; ++i) {
     source_.frames = {MakeFrame(milliseconds(70)), MakeFrame(milliseconds(35))};
-    node_.HandleSource(now_);
+    HandleFrames(2);
     now_.monotonic += milliseconds(70);
   }
   bus_.HandlePending();
@@ -180,7 +192,7 @@ TEST_F(CameraNodeTest, ImagesAboveOneDatagramAreCountedAndSaidOnce) {
   EXPECT_EQ(node_.Status(now_).level, status_t::OK);
   frame.bytes.push_back(0);
   source_.frames = {frame, frame, frame};
-  node_.HandleSource(now_);
+  HandleFrames(3);
   const NodeStatus status = node_.Status(now_);
   EXPECT_EQ(status.level, status_t::WARNING);
   EXPECT_EQ(status.message, "images have 65401 bytes, above 65400 are easily lost");
@@ -201,6 +213,7 @@ TEST_F(CameraNodeTest, ANetworkThatIsDownIsAnErrorAndCounted) {
   DownBus down;
   CameraNode node("front", Config(), source_, down, kRunId);
   source_.frames = {MakeFrame(milliseconds(1)), MakeFrame(milliseconds(1))};
+  node.HandleSource(now_);
   node.HandleSource(now_);
   const NodeStatus status = node.Status(now_);
   EXPECT_EQ(status.level, status_t::ERROR);
