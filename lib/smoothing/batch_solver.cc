@@ -146,7 +146,7 @@ ceres::Problem::Options ProblemOptions() {
 class WindowProblem {
  public:
   WindowProblem(KeyframeWindow& window, const FixWeighting& weighting)
-      : cauchy_(weighting.cauchy_scale_sigmas()), problem_(ProblemOptions()) {
+      : cauchy_(weighting.KernelScale()), problem_(ProblemOptions()) {
     Keyframe& oldest = window.keyframes.front();
     const PlanarPose prior =
         window.prior ? window.prior->pose

@@ -393,7 +393,7 @@ double ChainSolver::Cost(KeyframeWindow& window, const FixWeighting& weighting) 
         nodes_[i].residual.Linearize(nodes_[i - 1].estimate(), nodes_[i].estimate()).error;
     cost += motion.dot(nodes_[i].residual.covariance().inverse() * motion);
   }
-  const double scale = weighting.cauchy_scale_sigmas() * weighting.cauchy_scale_sigmas();
+  const double scale = weighting.KernelScale() * weighting.KernelScale();
   for (const AttachedFix& fix : window.fixes) {
     const Node& node = nodes_[static_cast<std::size_t>(fix.keyframe_id - nodes_.front().id)];
     const Eigen::Vector3d at = fix.residual.Linearize(node.estimate()).error;

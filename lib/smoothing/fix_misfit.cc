@@ -59,7 +59,7 @@ FixErrors FixMisfit::Measure(const KeyframeWindow& window, const FixWeighting& w
     if (fix.share <= 0.0) continue;
     const Eigen::Vector2d whitened = WhitenedError(window, fix) / std::sqrt(scatter_factor);
     const Eigen::Vector2d pull =
-        fix.share * weighting.KernelWeight(whitened.squaredNorm()) * whitened;
+        fix.share * weighting.UnitKernelWeight(whitened.squaredNorm()) * whitened;
     recent *= std::exp(-ToSeconds(fix.fix.time - last) / kReach);
     squared += pull.squaredNorm() + 2.0 * pull.dot(recent);
     recent += pull;

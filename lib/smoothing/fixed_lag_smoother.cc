@@ -24,6 +24,9 @@ constexpr int kStartIterations = 15;
 constexpr std::size_t kMostStartFixes = 60;
 /// Positions without heading need more than this many to say how the frames are turned.
 constexpr int kFewestPositions = 8;
+/// Where so many fixes do not agree, they may err by more than they say.
+constexpr std::size_t kDoubtfulFixes = 40;
+constexpr double kDoubtFactor = 5.0;
 /// A start whose heading is less certain than this would begin on the wrong side.
 constexpr double kStartHeadingSigma = 0.5;
 /// Fewer recent fixes than this overrule nothing.
@@ -39,8 +42,8 @@ const Eigen::Vector3d kLeastSigmas(1e-3, 1e-3, 1e-4);
 constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
 /// Room for so many fixes is made beforehand.
 constexpr std::size_t kUsualFixesPerKeyframe = 4;
-/// The misfit is measured anew when so many parts of the window's fixes are new, and used when it
-/// differs by more than this.
+/// Misfit and scatter are measured anew when so many parts of the window's fixes are new, and used
+/// when they differ by more than this.
 constexpr int kMisfitParts = 30;
 constexpr double kMisfitChange = 0.05;
 /// The systematic errors are estimated anew when so many parts of the fixes are new: of all fixes,
@@ -134,8 +137,6 @@ SystematicErrors SystematicErrorsOf(const SmootherConfig& config) {
 FixedLagSmoother::FixedLagSmoother(const SmootherConfig& config)
     : config_(config),
       weighting_(WeightingOf(config)),
-      consensus_options_{.radius_sigmas = config.relocalization_radius_sigmas,
-                         .min_radius_m = config.relocalization_min_radius_m},
       history_(FromSeconds(config.max_fix_age_s), FromSeconds(config.max_extrapolation_s)),
       chain_(static_cast<std::size_t>(config.window_keyframes) + 1) {
   window_.systematic = SystematicErrorsOf(config);
@@ -357,6 +358,17 @@ void FixedLagSmoother::NoteFixesChanged(std::int64_t keyframe_id) {
                       UpdateShares(window_, config_.fix_correlation_time_s, keyframe_id));
 }
 
+/// Not before some fixes lay where they were predicted: about a pose that is wrong all of them
+/// scatter.
+double FixedLagSmoother::SigmaFactor() const {
+  return agreements_since_start_ < config_.ok_fixes ? 1.0 : weighting_.SigmaFactor();
+}
+
+ConsensusOptions FixedLagSmoother::SupportOptions() const {
+  return {.radius_sigmas = SigmaFactor() * config_.relocalization_radius_sigmas,
+          .min_radius_m = config_.relocalization_min_radius_m};
+}
+
 double FixedLagSmoother::SquaredInnovation(const AttachedFix& fix) const {
   const Pose2 X_WF = window_.X_WF(fix);
   const Pose2& X_WM = fix.fix.X_WB;
@@ -364,15 +376,16 @@ double FixedLagSmoother::SquaredInnovation(const AttachedFix& fix) const {
       ComposeCovariance(newest_covariance_, fix.X_KF, fix.covariance_KB);
   const Eigen::Matrix2d R_WF = Eigen::Rotation2Dd(X_WF.yaw()).toRotationMatrix();
   const Eigen::Vector2d error_W = X_WM.translation() - X_WF.translation();
+  const Eigen::Matrix3d measured = SigmaFactor() * SigmaFactor() * fix.fix.covariance;
   if (!fix.fix.has_heading) {
-    const Eigen::Matrix2d innovation = R_WF * predicted.topLeftCorner<2, 2>() * R_WF.transpose() +
-                                       fix.fix.covariance.topLeftCorner<2, 2>();
+    const Eigen::Matrix2d innovation =
+        R_WF * predicted.topLeftCorner<2, 2>() * R_WF.transpose() + measured.topLeftCorner<2, 2>();
     return SquaredMahalanobis(error_W, innovation);
   }
   // Both along F's axes: they differ from the measured ones by the heading's error.
   Eigen::Vector3d error;
   error << R_WF.transpose() * error_W, WrapAngle(X_WM.yaw() - X_WF.yaw());
-  const Eigen::Matrix3d innovation = predicted + fix.fix.covariance;
+  const Eigen::Matrix3d innovation = predicted + measured;
   return SquaredMahalanobis(error, innovation);
 }
 
@@ -477,15 +490,29 @@ void FixedLagSmoother::TryStart() {
                          : std::max(config_.start_fixes, kFewestPositions);
   if (static_cast<int>(fixes.size()) < fewest) return;
   fixes = Thin(fixes, kMostStartFixes);
-  const auto consensus = FindConsensus(fixes, consensus_options_);
-  const double share = config_.start_inlier_share * static_cast<double>(fixes.size());
-  if (!consensus || consensus->supporters < std::max(static_cast<double>(fewest), share) ||
-      consensus->heading_sigma_rad > kStartHeadingSigma) {
-    return;
+  auto consensus = FindStart(fixes, fewest);
+  if (!consensus && fixes.size() >= kDoubtfulFixes) {
+    for (ConsensusFix& fix : fixes) {
+      fix.sigma_m *= kDoubtFactor;
+      fix.heading_sigma_rad *= kDoubtFactor;
+    }
+    consensus = FindStart(fixes, fewest);
   }
+  if (!consensus) return;
   is_started_ = true;
   agreements_since_start_ = 0;
   Reseed(consensus->X_WO);
+}
+
+std::optional<Consensus> FixedLagSmoother::FindStart(std::span<const ConsensusFix> fixes,
+                                                     int fewest) const {
+  const auto consensus = FindConsensus(fixes, SupportOptions());
+  const double share = config_.start_inlier_share * static_cast<double>(fixes.size());
+  if (!consensus || consensus->supporters < std::max(static_cast<double>(fewest), share) ||
+      consensus->heading_sigma_rad > kStartHeadingSigma) {
+    return std::nullopt;
+  }
+  return consensus;
 }
 
 void FixedLagSmoother::Reseed(const Pose2& X_WO) {
@@ -519,11 +546,11 @@ bool FixedLagSmoother::IsSupported(const Voter& voter) const {
   const Pose2 X_WB = window_.Has(voter.keyframe_id)
                          ? window_.Get(voter.keyframe_id).X_WK() * voter.X_KF
                          : X_WO() * voter.fix.X_OB;
-  return Supports(voter.fix, X_WB, consensus_options_);
+  return Supports(voter.fix, X_WB, SupportOptions());
 }
 
 bool FixedLagSmoother::TryMend() {
-  const auto found = FindOdometryBreak(window_, consensus_options_);
+  const auto found = FindOdometryBreak(window_, SupportOptions());
   if (!found) return false;
   ++counters_.relocalizations;
   agreements_since_start_ = 0;
@@ -545,7 +572,7 @@ bool FixedLagSmoother::TryRelocalize() {
                                                          static_cast<double>(voters_.size()))));
   if (static_cast<int>(voters_.size()) < needed) return false;
   const std::vector<ConsensusFix> fixes = VotersAsConsensus();
-  const auto consensus = FindConsensus(fixes, consensus_options_);
+  const auto consensus = FindConsensus(fixes, SupportOptions());
   if (!consensus || consensus->supporters < needed) return false;
   ++counters_.relocalizations;
   agreements_since_start_ = 0;
@@ -561,7 +588,7 @@ int FixedLagSmoother::SupportersInWindow(const std::optional<Pose2>& X_WO) const
   return static_cast<int>(
       std::count_if(window_.fixes.begin(), window_.fixes.end(), [&](const AttachedFix& attached) {
         const ConsensusFix fix = ToConsensusFix(attached.fix, X_OF(attached));
-        return Supports(fix, X_WO ? *X_WO * fix.X_OB : window_.X_WF(attached), consensus_options_);
+        return Supports(fix, X_WO ? *X_WO * fix.X_OB : window_.X_WF(attached), SupportOptions());
       }));
 }
 
@@ -573,7 +600,7 @@ void FixedLagSmoother::Relocalize(const Pose2& X_WO, std::span<const ConsensusFi
     int best_balance = 0;
     std::size_t first = voters.size() - 1;
     for (std::size_t i = voters.size(); i-- > 0;) {
-      balance += Supports(voters[i], X_WO * voters[i].X_OB, consensus_options_) ? 1 : -1;
+      balance += Supports(voters[i], X_WO * voters[i].X_OB, SupportOptions()) ? 1 : -1;
       if (balance <= best_balance) continue;
       best_balance = balance;
       first = i;
@@ -590,13 +617,22 @@ void FixedLagSmoother::CutBefore(std::int64_t keyframe_id) {
   std::erase_if(voters_, [&](const Voter& voter) { return voter.keyframe_id < keyframe_id; });
 }
 
+void FixedLagSmoother::TakeFixErrors(const FixErrors& errors) {
+  const auto has_changed = [](double from, double to) {
+    return std::abs(to / from - 1.0) > kMisfitChange;
+  };
+  if (has_changed(weighting_.misfit(), errors.misfit)) weighting_.SetMisfit(errors.misfit);
+  if (!has_changed(weighting_.scatter(), errors.scatter)) return;
+  const double factor = weighting_.SigmaFactor();
+  weighting_.SetScatter(errors.scatter);
+  if (weighting_.SigmaFactor() == factor) return;
+  chain_.FixesChanged(window_.keyframes.front().id, window_.keyframes.back().id);
+}
+
 void FixedLagSmoother::SolveWindow(int max_iterations) {
   if (--fixes_until_misfit_ <= 0) {
     fixes_until_misfit_ = static_cast<int>(window_.fixes.size()) / kMisfitParts;
-    const FixErrors errors = misfit_.Measure(window_, weighting_);
-    weighting_.SetScatter(errors.scatter);
-    const double change = std::abs(errors.misfit / weighting_.misfit() - 1.0);
-    if (change > kMisfitChange) weighting_.SetMisfit(errors.misfit);
+    TakeFixErrors(misfit_.Measure(window_, weighting_));
   }
   bool is_solved = chain_.Solve(window_, weighting_, max_iterations);
   if (is_solved && --fixes_until_systematic_ <= 0) {

@@ -144,17 +144,24 @@ class FixedLagSmoother {
                                                   const OdometrySample& sample) const;
   void Insert(AttachedFix fix);
   void NoteFixesChanged(std::int64_t keyframe_id);
+  /// By so many times the fixes' sigmas are to be taken for larger than they say.
+  [[nodiscard]] double SigmaFactor() const;
+  [[nodiscard]] ConsensusOptions SupportOptions() const;
   [[nodiscard]] double SquaredInnovation(const AttachedFix& fix) const;
   /// @return whether it is one more voter: not right beside another in time.
   bool Remember(const AttachedFix& attached);
   void NoteSupport(const OdometrySample& sample);
 
   void TryStart();
+  /// Where enough of the fixes agree.
+  [[nodiscard]] std::optional<Consensus> FindStart(std::span<const ConsensusFix> fixes,
+                                                   int fewest) const;
   bool TryMend();
   bool TryRelocalize();
   void Relocalize(const Pose2& X_WO, std::span<const ConsensusFix> voters);
   void Reseed(const Pose2& X_WO);
   void CutBefore(std::int64_t keyframe_id);
+  void TakeFixErrors(const FixErrors& errors);
   void SolveWindow(int max_iterations);
   void RestartAtNewest();
 
@@ -175,7 +182,6 @@ class FixedLagSmoother {
 
   SmootherConfig config_;
   FixWeighting weighting_;
-  ConsensusOptions consensus_options_;
   LeaveHandler on_leave_;
   SmootherCounters counters_;
 

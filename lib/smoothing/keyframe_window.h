@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -84,7 +85,8 @@ class FixWeighting {
  public:
   FixWeighting(double cauchy_scale_sigmas, double correlation_time_s, const FixBias& bias = {});
 
-  [[nodiscard]] double cauchy_scale_sigmas() const { return cauchy_scale_sigmas_; }
+  /// The kernel's, in the fixes' own sigmas.
+  [[nodiscard]] double KernelScale() const { return SigmaFactor() * cauchy_scale_sigmas_; }
   [[nodiscard]] double correlation_time_s() const { return correlation_time_s_; }
 
   /// As a part of what the fixes' covariances say.
@@ -100,13 +102,20 @@ class FixWeighting {
   }
   /// The kernel's weight of a squared error in squared standard deviations.
   [[nodiscard]] double KernelWeight(double squared_error) const {
+    return UnitKernelWeight(squared_error / std::max(1.0, scatter_));
+  }
+  /// The same where errors are as large as the fixes say.
+  [[nodiscard]] double UnitKernelWeight(double squared_error) const {
     return 1.0 / (1.0 + squared_error / (cauchy_scale_sigmas_ * cauchy_scale_sigmas_));
   }
   /// All fixes tell so many times less than if they erred independently.
   [[nodiscard]] double misfit() const { return misfit_; }
   void SetMisfit(double misfit) { misfit_ = misfit; }
   /// The fixes' errors are so many times, as a variance, what their covariances say.
+  [[nodiscard]] double scatter() const { return scatter_; }
   void SetScatter(double scatter) { scatter_ = scatter; }
+  /// By so many times a fix's sigmas are to be taken for larger than it says.
+  [[nodiscard]] double SigmaFactor() const { return std::sqrt(std::max(1.0, scatter_)); }
 
   /// Mean square of a fix's pull, its whitened position error times its weight, when errors are
   /// Gaussian.

@@ -8,6 +8,7 @@
 #include "smoothing/fixed_lag_smoother.h"
 #include "smoothing/offline_smoother.h"
 #include "smoothing/simulated_drive.h"
+#include "support/error_statistics.h"
 #include "support/slow_build.h"
 
 namespace relocd {
@@ -176,6 +177,37 @@ TEST(RecoveryTest, FixesThatComeBackAreBelievedWithinSeconds) {
     const Followed followed = Follow(drive);
     EXPECT_GT(followed.LargestAfter(seconds(69)), 8.0) << drive_case.seed;
     EXPECT_LT(followed.LargestAfter(seconds(73)), 2.5) << drive_case.seed;
+  }
+}
+
+/// A camera that says five times too little of its errors is followed as one that says the truth.
+TEST(RecoveryTest, FixesThatClaimTooMuchAreTakenAsTheyScatter) {
+  for (const bool has_heading : {false, true}) {
+    std::vector<double> claimed;
+    std::vector<double> honest;
+    for (unsigned seed = 0; seed < 5; ++seed) {
+      auto drive = DriveSimulator({.duration_s = 100.0,
+                                   .fix_rate_hz = 5.0,
+                                   .speed_mps = 6.0,
+                                   .fix_sigma_m = 0.5,
+                                   .outlier_share = 0.2,
+                                   .has_heading = has_heading},
+                                  seed)
+                       .Run();
+      const auto errors_after_start = [&drive](std::vector<double>& errors) {
+        const Followed followed = Follow(drive);
+        for (std::size_t i = 100; i < followed.errors_m.size(); ++i) {
+          EXPECT_TRUE(followed.estimates[i].has_pose) << i;
+          EXPECT_NE(followed.estimates[i].status, SmootherStatus::kLost) << i;
+          errors.push_back(followed.errors_m[i]);
+        }
+      };
+      errors_after_start(honest);
+      for (Fix& fix : drive.log.fixes)
+        fix.covariance *= 0.04;
+      errors_after_start(claimed);
+    }
+    EXPECT_LT(Summarize(claimed).rmse, 1.2 * Summarize(honest).rmse) << has_heading;
   }
 }
 
