@@ -506,7 +506,7 @@ void FixedLagSmoother::TryStart() {
 
 std::optional<Consensus> FixedLagSmoother::FindStart(std::span<const ConsensusFix> fixes,
                                                      int fewest) const {
-  const auto consensus = FindConsensus(fixes, SupportOptions());
+  auto consensus = FindConsensus(fixes, SupportOptions());
   const double share = config_.start_inlier_share * static_cast<double>(fixes.size());
   if (!consensus || consensus->supporters < std::max(static_cast<double>(fewest), share) ||
       consensus->heading_sigma_rad > kStartHeadingSigma) {
