@@ -42,8 +42,8 @@ const Eigen::Vector3d kLeastSigmas(1e-3, 1e-3, 1e-4);
 constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
 /// Room for so many fixes is made beforehand.
 constexpr std::size_t kUsualFixesPerKeyframe = 4;
-/// Misfit and scatter are measured anew when so many parts of the window's fixes are new, and used
-/// when they differ by more than this.
+/// The misfit is measured anew when so many parts of the window's fixes are new, and used when it
+/// differs by more than this.
 constexpr int kMisfitParts = 30;
 constexpr double kMisfitChange = 0.05;
 /// The systematic errors are estimated anew when so many parts of the fixes are new: of all fixes,
@@ -618,14 +618,9 @@ void FixedLagSmoother::CutBefore(std::int64_t keyframe_id) {
 }
 
 void FixedLagSmoother::TakeFixErrors(const FixErrors& errors) {
-  const auto has_changed = [](double from, double to) {
-    return std::abs(to / from - 1.0) > kMisfitChange;
-  };
-  if (has_changed(weighting_.misfit(), errors.misfit)) weighting_.SetMisfit(errors.misfit);
-  if (!has_changed(weighting_.scatter(), errors.scatter)) return;
-  const double factor = weighting_.SigmaFactor();
-  weighting_.SetScatter(errors.scatter);
-  if (weighting_.SigmaFactor() == factor) return;
+  const double change = std::abs(errors.misfit / weighting_.misfit() - 1.0);
+  if (change > kMisfitChange) weighting_.SetMisfit(errors.misfit);
+  if (!weighting_.SetScatter(errors.scatter)) return;
   chain_.FixesChanged(window_.keyframes.front().id, window_.keyframes.back().id);
 }
 

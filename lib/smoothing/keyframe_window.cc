@@ -131,6 +131,15 @@ FixWeighting::FixWeighting(double cauchy_scale_sigmas,
       correction_without_heading_(KernelCorrection(cauchy_scale_sigmas, 2)),
       expected_squared_pull_(IntegrateKernel(cauchy_scale_sigmas, 2).squared_pull) {}
 
+bool FixWeighting::SetScatter(double scatter) {
+  constexpr double kLeastChange = 0.05;
+  scatter_ = scatter;
+  const double factor = std::sqrt(std::max(1.0, scatter));
+  if (std::abs(factor / sigma_factor_ - 1.0) <= kLeastChange) return false;
+  sigma_factor_ = factor;
+  return true;
+}
+
 bool KeyframeWindow::Has(std::int64_t keyframe_id) const {
   return !keyframes.empty() && keyframe_id >= keyframes.front().id &&
          keyframe_id <= keyframes.back().id;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -102,7 +101,7 @@ class FixWeighting {
   }
   /// The kernel's weight of a squared error in squared standard deviations.
   [[nodiscard]] double KernelWeight(double squared_error) const {
-    return UnitKernelWeight(squared_error / std::max(1.0, scatter_));
+    return UnitKernelWeight(squared_error / (sigma_factor_ * sigma_factor_));
   }
   /// The same where errors are as large as the fixes say.
   [[nodiscard]] double UnitKernelWeight(double squared_error) const {
@@ -112,10 +111,12 @@ class FixWeighting {
   [[nodiscard]] double misfit() const { return misfit_; }
   void SetMisfit(double misfit) { misfit_ = misfit; }
   /// The fixes' errors are so many times, as a variance, what their covariances say.
-  [[nodiscard]] double scatter() const { return scatter_; }
-  void SetScatter(double scatter) { scatter_ = scatter; }
+  ///
+  /// @return whether the kernel's weights are others now, and so all fixes are to be linearised
+  /// anew. It costs what many fixes do, so a twentieth of a sigma is no reason.
+  bool SetScatter(double scatter);
   /// By so many times a fix's sigmas are to be taken for larger than it says.
-  [[nodiscard]] double SigmaFactor() const { return std::sqrt(std::max(1.0, scatter_)); }
+  [[nodiscard]] double SigmaFactor() const { return sigma_factor_; }
 
   /// Mean square of a fix's pull, its whitened position error times its weight, when errors are
   /// Gaussian.
@@ -130,6 +131,7 @@ class FixWeighting {
   double expected_squared_pull_;
   double misfit_ = 1.0;
   double scatter_ = 1.0;
+  double sigma_factor_ = 1.0;
 };
 
 /// What is known of a keyframe from those before it.
