@@ -87,7 +87,7 @@ void Add(const OdometryIncrement& increment, Summary& summary) {
 
 void Print(const Summary& summary, const WheelOdometry& odometry, bool json) {
   const WheelOdometry::Counters& counts = odometry.counters();
-  const MessageGuard::Counters frames = odometry.signals().counters();
+  const MessageGuard::Counters frames = odometry.frame_counters();
   const double duration_s = summary.begin ? ToSeconds(summary.last.time - *summary.begin) : 0.0;
   const Pose2& X_OB = summary.last.X_OB;
   if (json) {

@@ -166,7 +166,7 @@ NodeStatus OdometryNode::Status(const ClockReading& now) const {
   NodeStatus status;
   RaiseLevel(now, status);
   const WheelOdometry::Counters& counts = odometry_.counters();
-  const MessageGuard::Counters frames = odometry_.signals().counters();
+  const MessageGuard::Counters frames = odometry_.frame_counters();
   const auto add = [&status](const char* name, auto value) {
     status.Add(name, static_cast<double>(value));
   };

@@ -71,6 +71,15 @@ class MessageGuard {
     std::int64_t stuck_counters = 0;  ///< Refused: the same count as the frame before.
     std::int64_t short_frames = 0;    ///< Refused: not as long as the DBC file says.
     std::int64_t missing_frames = 0;  ///< By the counter.
+
+    Counters& operator+=(const Counters& more) {
+      frames += more.frames;
+      bad_checksums += more.bad_checksums;
+      stuck_counters += more.stuck_counters;
+      short_frames += more.short_frames;
+      missing_frames += more.missing_frames;
+      return *this;
+    }
   };
   [[nodiscard]] const Counters& counters() const { return counters_; }
 

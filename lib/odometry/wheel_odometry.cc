@@ -133,6 +133,19 @@ std::vector<CanId> WheelOdometry::ids() const {
   return ids;
 }
 
+MessageGuard::Counters WheelOdometry::frame_counters() const {
+  MessageGuard::Counters sum = signals_.counters();
+  std::vector<CanId> counted = signals_.ids();
+  for (const auto* reader : {&steering_signal_, &steering_fraction_, &yaw_rate_signal_}) {
+    if (!reader->has_value()) continue;
+    const CanId id = (*reader)->id();
+    if (std::find(counted.begin(), counted.end(), id) != counted.end()) continue;
+    counted.push_back(id);
+    sum += (*reader)->counters();
+  }
+  return sum;
+}
+
 std::optional<double> WheelOdometry::yaw_rate_bias_radps() const {
   if (!yaw_rate_) return std::nullopt;
   return yaw_rate_->bias_radps();

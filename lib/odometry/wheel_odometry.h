@@ -11,6 +11,7 @@
 
 #include "can/can_frame.h"
 #include "can/dbc.h"
+#include "can/message_guard.h"
 #include "can/signal_reader.h"
 #include "core/result.h"
 #include "core/time.h"
@@ -145,6 +146,8 @@ class WheelOdometry {
   [[nodiscard]] const WheelSignals& signals() const { return signals_; }
   /// The frames that it needs, each once.
   [[nodiscard]] std::vector<CanId> ids() const;
+  /// Of all these frames: wheels, steering and yaw rate.
+  [[nodiscard]] MessageGuard::Counters frame_counters() const;
   /// What the yaw-rate sensor is taken to report when nothing turns.
   [[nodiscard]] std::optional<double> yaw_rate_bias_radps() const;
   /// Of a front wheel in the middle, if it is measured and not too old.

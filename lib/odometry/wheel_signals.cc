@@ -137,13 +137,8 @@ Result<void> WheelSignals::AddGuards(const WheelSignalsConfig& config,
 
 MessageGuard::Counters WheelSignals::counters() const {
   MessageGuard::Counters sum;
-  for (const auto& [id, guard] : guards_) {
-    sum.frames += guard.counters().frames;
-    sum.bad_checksums += guard.counters().bad_checksums;
-    sum.stuck_counters += guard.counters().stuck_counters;
-    sum.short_frames += guard.counters().short_frames;
-    sum.missing_frames += guard.counters().missing_frames;
-  }
+  for (const auto& [id, guard] : guards_)
+    sum += guard.counters();
   return sum;
 }
 

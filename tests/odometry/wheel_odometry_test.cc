@@ -487,6 +487,16 @@ class CarTest {
     }
   }
 
+  /// A frame that ends before its last byte.
+  void SendCut(const std::string& name) {
+    const DbcMessage& message = *dbc_.FindMessage(name).value();
+    CanFrame frame;
+    frame.id = message.id;
+    frame.size = static_cast<std::uint8_t>(message.size - 1);
+    frame.receive_time = FromNanoseconds(time_ns_);
+    EXPECT_FALSE(odometry_.Handle(frame));
+  }
+
   void JumpBack(double seconds) { time_ns_ -= static_cast<std::int64_t>(1e9 * seconds); }
 
   /// Distance and heading from the truth.
@@ -550,6 +560,16 @@ TEST(CarYawRateTest, LearnsTheBiasWhileItStandsAndFollows) {
   EXPECT_EQ(car.last().flags, kOdometryStandstill);
   car.Drive(5.0, 0.3, 5.0);
   EXPECT_LT(car.Error()[1], 0.01);
+}
+
+TEST(CarYawRateTest, CountsTheFramesOfAllItsSensors) {
+  CarTest car(WithYawRate(CarConfig("ackermann")));
+  car.Drive(5.0, 0.0, 0.1);
+  for (const char* name : {"STEERING", "INERTIAL", "INERTIAL", "SPEEDS"})
+    car.SendCut(name);
+  EXPECT_EQ(car.odometry().frame_counters().frames, 34);
+  EXPECT_EQ(car.odometry().frame_counters().short_frames, 4);
+  EXPECT_EQ(car.odometry().signals().counters().short_frames, 1);
 }
 
 /// As a car that creeps slower than its wheels' sensors see.
