@@ -31,6 +31,30 @@ bool IsInteger(const DbcSignal& signal) {
   return signal.type == RawType::kUnsigned || signal.type == RawType::kSigned;
 }
 
+/// The rule given for the message, with the counter and the checksum that the config names for the
+/// wheels' message put over it.
+Result<MessageRule> RuleFor(const DbcMessage& message,
+                            const DbcMessage& wheels,
+                            const WheelSignals::Rules& rules,
+                            const WheelSignalsConfig& config) {
+  const auto given = rules.find(message.name);
+  MessageRule rule = given == rules.end() ? MessageRule() : given->second;
+  if (message.id != wheels.id) return rule;
+  auto counter = NameInMessage("counter_signal", config.counter_signal, wheels);
+  if (!counter) return std::move(counter).error();
+  auto checksum = NameInMessage("checksum_signal", config.checksum_signal, wheels);
+  if (!checksum) return std::move(checksum).error();
+  if (!counter->empty()) {
+    rule.counter = *counter;
+    rule.counter_step = config.counter_step;
+  }
+  if (!checksum->empty()) {
+    rule.checksum = *checksum;
+    rule.checksum_rule = config.checksum_rule;
+  }
+  return rule;
+}
+
 }  // namespace
 
 Result<void> WheelSignalsConfig::Validate() const {
@@ -110,25 +134,10 @@ Result<void> WheelSignals::AddInput(const std::string& name, const DbcFile& dbc)
 Result<void> WheelSignals::AddGuards(const WheelSignalsConfig& config,
                                      const DbcFile& dbc,
                                      const Rules& rules) {
-  const DbcMessage& left = inputs_.front().message;
   for (const Input& input : inputs_) {
-    const auto given = rules.find(input.message.name);
-    MessageRule rule = given == rules.end() ? MessageRule() : given->second;
-    if (input.message.id == left.id) {
-      auto counter = NameInMessage("counter_signal", config.counter_signal, left);
-      if (!counter) return std::move(counter).error().WithContext(dbc.path());
-      auto checksum = NameInMessage("checksum_signal", config.checksum_signal, left);
-      if (!checksum) return std::move(checksum).error().WithContext(dbc.path());
-      if (!counter->empty()) {
-        rule.counter = *counter;
-        rule.counter_step = config.counter_step;
-      }
-      if (!checksum->empty()) {
-        rule.checksum = *checksum;
-        rule.checksum_rule = config.checksum_rule;
-      }
-    }
-    auto guard = MessageGuard::Create(rule, input.message);
+    auto rule = RuleFor(input.message, inputs_.front().message, rules, config);
+    if (!rule) return std::move(rule).error().WithContext(dbc.path());
+    auto guard = MessageGuard::Create(*rule, input.message);
     if (!guard) return std::move(guard).error().WithContext(dbc.path());
     guards_.emplace(input.message.id, std::move(guard).value());
   }
