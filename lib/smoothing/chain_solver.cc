@@ -183,11 +183,8 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
   node.are_fixes_new = false;
   node.has_fixes = false;
   SystematicNode& systematic = systematic_[static_cast<std::size_t>(node.id - nodes_.front().id)];
-  systematic.pose_rhs_by_camera.setZero();
-  systematic.information.setZero();
-  systematic.rhs.setZero();
-  systematic.rhs_by_bias.setZero();
   const bool is_camera_sought = window.systematic.IsCameraSought();
+  if (is_camera_sought) systematic.fixes = {};
   for (AttachedFix* fix = window.FirstFix(node.id);
        fix != window.fixes.end() && fix->keyframe_id == node.id;
        ++fix) {
@@ -204,10 +201,10 @@ void ChainSolver::LinearizeFixes(KeyframeWindow& window,
       const ByCamera by_camera = fix->ErrorByCamera(node.weighted_at.z());
       const Eigen::Matrix<double, 2, 3> camera_gradient =
           weight * by_camera.transpose() * information;
-      systematic.pose_rhs_by_camera -= gradient * by_camera;
-      systematic.information += camera_gradient * by_camera;
-      systematic.rhs_by_bias += camera_gradient * fix->covariance_root;
-      systematic.rhs -= camera_gradient * (at.error - at.by_K * node.delta);
+      systematic.fixes.pose_rhs_by_camera -= gradient * by_camera;
+      systematic.fixes.information += camera_gradient * by_camera;
+      systematic.fixes.rhs_by_bias += camera_gradient * fix->covariance_root;
+      systematic.fixes.rhs -= camera_gradient * (at.error - at.by_K * node.delta);
     }
     node.largest_information_m =
         std::max({node.largest_information_m, information(0, 0), information(1, 1)});
@@ -292,7 +289,7 @@ void ChainSolver::CorrectSystematic(const KeyframeWindow& window,
                                     std::size_t i) {
   const SystematicState before = PredictSystematic(window, i);
   const Node& node = nodes_[i];
-  const SystematicNode& fixes = systematic_[i];
+  const FixesByCamera& fixes = systematic_[i].fixes;
   SystematicState& state = systematic_[i].state;
   state = before;
   if (!node.has_fixes) return;

@@ -145,18 +145,22 @@ class ChainSolver {
     SystematicKnowledge known;
   };
 
+  /// What a keyframe's fixes say of the camera's errors, without the misfit: with the keyframe as
+  /// it is, information * errors = rhs.
+  struct FixesByCamera {
+    ByCamera pose_rhs_by_camera = ByCamera::Zero();
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
+    Eigen::Matrix<double, 2, 3> rhs_by_bias = Eigen::Matrix<double, 2, 3>::Zero();
+  };
+
   /// A keyframe's part of the equations that concerns the systematic errors, apart from the node:
   /// what each fix looks at in all nodes is nearer together in the cache.
   struct SystematicNode {
     /// Of the motion from the node before, along that node's axes and along W's.
     ByOdometry motion_P_by_odometry = ByOdometry::Zero();
     ByOdometry motion_by_odometry = ByOdometry::Zero();
-    /// The fixes' part, without the misfit: with the keyframe as it is, information * (the camera's
-    /// errors) = rhs.
-    ByCamera pose_rhs_by_camera = ByCamera::Zero();
-    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d rhs = Eigen::Vector2d::Zero();
-    Eigen::Matrix<double, 2, 3> rhs_by_bias = Eigen::Matrix<double, 2, 3>::Zero();
+    FixesByCamera fixes;  ///< Zero where the camera's errors are not sought.
 
     SystematicState state;
   };

@@ -111,7 +111,7 @@ void ExpectToBeFoundAfterASlip(Pose2 (*slip)(const Pose2&)) {
     ChangeOdometry(seconds(2), slip, drive);
     const Followed followed = Follow(drive);
     EXPECT_GT(followed.LargestAfter(seconds(41)), 5.0) << drive_case.seed;
-    EXPECT_LT(followed.LargestAfter(seconds(45)), 3.0) << drive_case.seed;
+    EXPECT_LT(followed.LargestAfter(seconds(45)), 2.5) << drive_case.seed;
     EXPECT_EQ(followed.counters.relocalizations, 1) << drive_case.seed;
     EXPECT_EQ(followed.estimates.back().status, SmootherStatus::kOk) << drive_case.seed;
   }
