@@ -66,9 +66,8 @@ struct Config {
 
 /// Reads, checks and completes a config.
 ///
-/// @param path       paths in the file are relative to its folder, and absolute in the result.
-/// Empty:
-///                   the defaults.
+/// @param path       of the file; empty: the defaults. Paths in it are relative to its folder, and
+///                   absolute in the result.
 /// @param overrides  `section.key=value`, put over the file's.
 /// @return kInvalidInput with file, line, key, value and what is allowed; kUnavailable when the
 /// file cannot be read.
