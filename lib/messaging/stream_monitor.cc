@@ -1,6 +1,12 @@
 #include "messaging/stream_monitor.h"
 
 namespace relocd {
+namespace {
+
+/// Weeks of messages at 1 kHz: numbers further apart are no loss.
+constexpr std::uint64_t kMostLost = std::uint64_t{1} << 32;
+
+}  // namespace
 
 void StreamMonitor::Observe(const StreamPosition& position) {
   if (!last_) {
@@ -21,7 +27,14 @@ void StreamMonitor::Observe(const StreamPosition& position) {
     ++counters_.repeated;
     return;
   }
-  counters_.lost += position.seq - last_->seq - 1;
+  // Unsigned: any two numbers may stand in messages, and their difference may need 64 bits.
+  const std::uint64_t lost =
+      static_cast<std::uint64_t>(position.seq) - static_cast<std::uint64_t>(last_->seq) - 1;
+  if (lost <= kMostLost) {
+    counters_.lost += static_cast<std::int64_t>(lost);
+  } else {
+    ++counters_.restarts;
+  }
   last_ = position;
 }
 

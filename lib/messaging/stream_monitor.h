@@ -17,7 +17,7 @@ class StreamMonitor {
   struct Counters {
     std::int64_t lost = 0;      ///< Skipped numbers within a run.
     std::int64_t repeated = 0;  ///< Numbers that came again, or late.
-    std::int64_t restarts = 0;  ///< The publisher started anew.
+    std::int64_t restarts = 0;  ///< The publisher started anew, or leapt in its numbers.
     std::int64_t conflicts =
         0;  ///< Messages of a run that another had followed: two publish on one channel.
   };

@@ -1,5 +1,8 @@
 #include "messaging/stream_monitor.h"
 
+#include <cstdint>
+#include <limits>
+
 #include <gtest/gtest.h>
 
 namespace relocd {
@@ -48,6 +51,17 @@ TEST(StreamMonitorTest, ReportsTwoPublishersThatTakeTurns) {
   EXPECT_EQ(monitor.counters().restarts, 1);
   EXPECT_EQ(monitor.counters().conflicts, 18);
   EXPECT_EQ(monitor.counters().lost, 0);
+}
+
+TEST(StreamMonitorTest, TakesAJumpThatNoLossCanMakeForAStreamBegunAnew) {
+  constexpr std::int64_t kLowest = std::numeric_limits<std::int64_t>::min();
+  constexpr std::int64_t kHighest = std::numeric_limits<std::int64_t>::max();
+  StreamMonitor monitor;
+  for (const std::int64_t seq : {kLowest, kHighest, kHighest, kLowest})
+    monitor.Observe({.seq = seq, .run_id = 1});
+  EXPECT_EQ(monitor.counters().lost, 0);
+  EXPECT_EQ(monitor.counters().restarts, 1);
+  EXPECT_EQ(monitor.counters().repeated, 2);
 }
 
 }  // namespace
