@@ -300,6 +300,7 @@ Result<void> CheckMultiplexing(const DbcMessage& message) {
 class DbcParser {
  public:
   Result<void> ParseLine(std::string_view line);
+  [[nodiscard]] std::size_t line_number() const { return line_number_; }
   Result<std::vector<DbcMessage>> Finish() &&;
 
  private:
@@ -319,15 +320,17 @@ class DbcParser {
   DbcMessage* Find(CanId id);
   DbcSignal* Find(CanId id, std::string_view signal_name);
 
+  std::size_t line_number_ = 0;  ///< Of the last line that was read; the first is 1.
   std::vector<DbcMessage> messages_;
   std::map<CanId, std::size_t> indices_;  ///< Into messages_.
   std::set<std::string> names_;
   std::map<std::string, std::map<std::int64_t, std::string>> value_tables_;
-  bool in_new_symbols_ = false;  ///< Within NS_, which lists keywords, one a line.
-  std::string keyword_;          ///< Of the section that is being read; empty outside of one.
-  std::string section_;          ///< What it said so far.
-  bool in_quotes_ = false;       ///< Within a text of it.
-  bool escaped_ = false;         ///< Behind a backslash within a text.
+  bool in_new_symbols_ = false;   ///< Within NS_, which lists keywords, one a line.
+  std::string keyword_;           ///< Of the section that is being read; empty outside of one.
+  std::string section_;           ///< What it said so far.
+  std::size_t section_line_ = 0;  ///< Where it began.
+  bool in_quotes_ = false;        ///< Within a text of it.
+  bool escaped_ = false;          ///< Behind a backslash within a text.
 };
 
 /// Sections that may go over lines, until a `;` outside of quotes.
@@ -343,6 +346,7 @@ bool EndsWithSemicolon(std::string_view keyword) {
 }
 
 Result<void> DbcParser::ParseLine(std::string_view line) {
+  ++line_number_;
   if (!keyword_.empty()) return ContinueSection(line);
   line = Trim(line);
   if (line.empty() || line.starts_with("//")) return {};
@@ -358,6 +362,7 @@ Result<void> DbcParser::ParseLine(std::string_view line) {
   if (keyword == "SIG_VALTYPE_") return SetRawType(LineParser(rest));
   if (EndsWithSemicolon(keyword)) {
     keyword_ = keyword;
+    section_line_ = line_number_;
     return ContinueSection(rest);
   }
   if (IsName(keyword)) return {};  // VERSION, NS_, BS_, BU_ and what later versions may bring
@@ -557,7 +562,10 @@ Result<void> DbcParser::SetAttribute(LineParser parser) {
 }
 
 Result<std::vector<DbcMessage>> DbcParser::Finish() && {
-  if (!keyword_.empty()) return Malformed("the file ends within a section, must end it with ';'");
+  if (!keyword_.empty()) {
+    return Malformed(fmt::format(
+        "line {}: {} begins here and has no end, must end with ';'", section_line_, keyword_));
+  }
   if (messages_.empty()) return Malformed("has no message (BO_), must have at least one");
   for (DbcMessage& message : messages_) {
     NameMultiplexors(message);
@@ -585,11 +593,12 @@ Result<DbcFile> DbcFile::Parse(std::string_view text, const std::string& path) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   DbcParser parser;
-  for (std::size_t line_number = 1; !text.empty(); ++line_number) {
+  while (!text.empty()) {
     const auto end = text.find('\n');
     auto ok = parser.ParseLine(text.substr(0, end));
     if (!ok) {
-      return std::move(ok).error().WithContext(fmt::format("{}: line {}", path, line_number));
+      return std::move(ok).error().WithContext(
+          fmt::format("{}: line {}", path, parser.line_number()));
     }
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
   }

@@ -128,7 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
          "ELF', must begin with a keyword such as BO_ or SG_"},
         {"OpenSection",
          "BO_ 1 A: 8 X\nCM_ \"no end",
-         "v.dbc: the file ends within a section, must end it with ';'"},
+         "v.dbc: line 2: CM_ begins here and has no end, must end with ';'"},
         {"SignalFirst",
          "SG_ FR : 0|8@1+ (1,0) [0|0] \"\" X",
          "v.dbc: line 1: signal (SG_) before any message (BO_)"},
