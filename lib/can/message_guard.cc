@@ -30,6 +30,22 @@ Result<DbcSignal> FindInteger(const DbcMessage& message, const char* key, const 
   return *signal;
 }
 
+/// That a number of the rule can be told by the counter's bits.
+Result<void> CheckWithinCounter(const char* key,
+                                int number,
+                                std::uint64_t maximum,
+                                const DbcMessage& message,
+                                const DbcSignal& counter) {
+  if (static_cast<std::uint64_t>(number) <= maximum) return {};
+  return Invalid(fmt::format("{} is {}, must be at most {}: counter signal '{}.{}' has {} bits",
+                             key,
+                             number,
+                             maximum,
+                             message.name,
+                             counter.name,
+                             counter.length));
+}
+
 bool IsOnByteBorders(const DbcSignal& signal) {
   return signal.start_bit % 8 == (signal.byte_order == ByteOrder::kLittleEndian ? 0 : 7);
 }
@@ -42,6 +58,11 @@ Result<void> MessageRule::Validate() const {
   }
   if (counter_modulo != 0 && counter_modulo < 2) {
     return Invalid(fmt::format("counter_modulo is {}, must be 0 or at least 2", counter_modulo));
+  }
+  if (counter_modulo != 0 && counter_step >= counter_modulo) {
+    return Invalid(fmt::format("counter_step is {}, must be below the counter_modulo of {}",
+                               counter_step,
+                               counter_modulo));
   }
   const auto rule = ParseChecksumRule(checksum_rule);
   if (!rule) return Invalid("checksum_rule " + rule.error().message);
@@ -69,15 +90,10 @@ Result<MessageGuard> MessageGuard::Create(const MessageRule& rule, const DbcMess
   MessageGuard guard(message.size);
   guard.max_age_ = FromSeconds(rule.max_age_s);
   guard.data_id_ = static_cast<std::uint16_t>(rule.data_id);
-  guard.step_ = static_cast<std::uint64_t>(rule.counter_step);
   if (!rule.counter.empty()) {
     auto counter = FindInteger(message, "counter", rule.counter);
     if (!counter) return std::move(counter).error();
-    guard.counter_ = *counter;
-    const std::uint64_t range =
-        counter->length == 64 ? 0 : std::uint64_t{1} << static_cast<unsigned>(counter->length);
-    guard.modulo_ =
-        rule.counter_modulo != 0 ? static_cast<std::uint64_t>(rule.counter_modulo) : range;
+    if (auto ok = guard.SetCounter(rule, message, *counter); !ok) return std::move(ok).error();
   }
   if (rule.checksum.empty()) return guard;
   auto checksum = FindInteger(message, "checksum", rule.checksum);
@@ -97,11 +113,32 @@ Result<MessageGuard> MessageGuard::Create(const MessageRule& rule, const DbcMess
   return guard;
 }
 
+Result<void> MessageGuard::SetCounter(const MessageRule& rule,
+                                      const DbcMessage& message,
+                                      const DbcSignal& counter) {
+  counter_ = counter;
+  step_ = static_cast<std::uint64_t>(rule.counter_step);
+  modulo_ = static_cast<std::uint64_t>(rule.counter_modulo);
+  if (counter.length == 64) return {};
+  const std::uint64_t range = std::uint64_t{1} << static_cast<unsigned>(counter.length);
+  if (modulo_ == 0) modulo_ = range;
+  if (auto ok = CheckWithinCounter("counter_modulo", rule.counter_modulo, range, message, counter);
+      !ok) {
+    return ok;
+  }
+  return CheckWithinCounter("counter_step", rule.counter_step, range - 1, message, counter);
+}
+
 bool MessageGuard::HasRightChecksum(const CanFrame& frame) const {
   const ChecksumContext context{
       .data_id = data_id_,
       .count = counter_ ? DecodeBits(*counter_, frame.payload()).value_or(0) : 0};
   return DecodeBits(*checksum_, frame.payload()) == Checksum(rule_, frame, *checksum_, context);
+}
+
+std::uint64_t MessageGuard::Advance(std::uint64_t before, std::uint64_t after) const {
+  if (modulo_ == 0) return after - before;
+  return (after % modulo_ + modulo_ - before % modulo_) % modulo_;
 }
 
 MessageGuard::Judgement MessageGuard::Judge(const CanFrame& frame) {
@@ -117,8 +154,7 @@ MessageGuard::Judgement MessageGuard::Judge(const CanFrame& frame) {
   Judgement judgement;
   if (counter_) {
     const std::uint64_t count = DecodeBits(*counter_, frame.payload()).value_or(0);
-    std::uint64_t advance = last_count_ ? count - *last_count_ : step_;
-    if (modulo_ != 0) advance = last_count_ && count < *last_count_ ? advance + modulo_ : advance;
+    const std::uint64_t advance = last_count_ ? Advance(*last_count_, count) : step_;
     last_count_ = count;
     if (advance == 0) {
       ++counters_.stuck_counters;

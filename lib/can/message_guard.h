@@ -25,7 +25,9 @@ struct MessageRule {
   template <typename Self, typename Visitor>
   static void VisitFields(Self& self, Visitor&& visit) {
     visit("counter", self.counter, "the signal that counts the frames; may be empty");
-    visit("counter_step", self.counter_step, ">= 1; from one frame to the next");
+    visit("counter_step",
+          self.counter_step,
+          ">= 1, below what the counter can count; from one frame to the next");
     visit("counter_modulo",
           self.counter_modulo,
           "0, or >= 2 where the counter wraps earlier than its bits: 15 in AUTOSAR's profile 1");
@@ -86,6 +88,11 @@ class MessageGuard {
  private:
   explicit MessageGuard(int size) : size_(size) {}
 
+  Result<void> SetCounter(const MessageRule& rule,
+                          const DbcMessage& message,
+                          const DbcSignal& counter);
+  /// From one count to another, across the wrap.
+  [[nodiscard]] std::uint64_t Advance(std::uint64_t before, std::uint64_t after) const;
   [[nodiscard]] bool HasRightChecksum(const CanFrame& frame) const;
 
   int size_;

@@ -60,6 +60,15 @@ TEST(MessageGuardTest, KnowsACounterThatWrapsBeforeItsBits) {
   EXPECT_EQ(judge(13), 12);
 }
 
+TEST(MessageGuardTest, TakesACountThatIsNotBelowTheModuloForItsRemainder) {
+  MessageGuard guard = Guard({.counter = "COUNTER", .counter_modulo = 10});
+  const auto judge = [&](std::uint64_t count) {
+    return guard.Judge(WheelTicksFrame(Dbc(), {.count = count})).missing_frames;
+  };
+  EXPECT_EQ(judge(14), 0);
+  EXPECT_EQ(judge(1), 6);  // 4 to 11
+}
+
 TEST(MessageGuardTest, CountsWithSteps) {
   MessageGuard guard = Guard({.counter = "COUNTER", .counter_step = 4});
   const auto judge = [&](std::uint64_t count) {
@@ -80,6 +89,15 @@ TEST(MessageGuardTest, NamesWhatDoesNotFit) {
   EXPECT_EQ(error_of({.checksum = "CHECKSUM", .checksum_rule = "honda"}),
             "checksum signal 'WHEEL_TICKS.CHECKSUM' has 8 bits from bit 56, must have 4");
   EXPECT_EQ(error_of({.counter_modulo = 1}), "counter_modulo is 1, must be 0 or at least 2");
+  EXPECT_EQ(error_of({.counter_step = 15, .counter_modulo = 15}),
+            "counter_step is 15, must be below the counter_modulo of 15");
+  EXPECT_EQ(error_of({.counter = "COUNTER", .counter_modulo = 17}),
+            "counter_modulo is 17, must be at most 16: counter signal 'WHEEL_TICKS.COUNTER' has 4 "
+            "bits");
+  EXPECT_EQ(error_of({.counter = "COUNTER", .counter_modulo = 16}), "");
+  EXPECT_EQ(error_of({.counter = "COUNTER", .counter_step = 16}),
+            "counter_step is 16, must be at most 15: counter signal 'WHEEL_TICKS.COUNTER' has 4 "
+            "bits");
   EXPECT_EQ(error_of({.data_id = 65536}), "data_id is 65536, must be in [0, 65535]");
   EXPECT_EQ(error_of({.max_age_s = 0.0}), "max_age_s is 0, must be in (0, 1e6)");
   EXPECT_EQ(error_of({.checksum = "CHECKSUM", .checksum_rule = "autosar_p1_alternating"}),
