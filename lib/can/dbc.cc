@@ -281,17 +281,15 @@ void NameMultiplexors(DbcMessage& message) {
   }
 }
 
-/// Follows each signal's multiplexors up to one that is always there.
-Result<void> CheckMultiplexing(const DbcMessage& message) {
-  for (const DbcSignal& signal : message.signals) {
-    const DbcSignal* above = &signal;
-    for (std::size_t steps = 0; above != nullptr && !above->multiplexor.empty(); ++steps) {
-      if (steps > message.signals.size()) {
-        return Malformed(fmt::format(
-            "signal {}.{}: its multiplexors go round in a circle", message.name, signal.name));
-      }
-      above = message.FindSignal(above->multiplexor);
+/// Follows the signal's multiplexors up to one that is always there.
+Result<void> CheckMultiplexing(const DbcMessage& message, const DbcSignal& signal) {
+  const DbcSignal* above = &signal;
+  for (std::size_t steps = 0; above != nullptr && !above->multiplexor.empty(); ++steps) {
+    if (steps > message.signals.size()) {
+      return Malformed(fmt::format(
+          "signal {}.{}: its multiplexors go round in a circle", message.name, signal.name));
     }
+    above = message.FindSignal(above->multiplexor);
   }
   return {};
 }
@@ -569,7 +567,9 @@ Result<std::vector<DbcMessage>> DbcParser::Finish() && {
   if (messages_.empty()) return Malformed("has no message (BO_), must have at least one");
   for (DbcMessage& message : messages_) {
     NameMultiplexors(message);
-    if (auto ok = CheckMultiplexing(message); !ok) return std::move(ok).error();
+    for (const DbcSignal& signal : message.signals) {
+      if (auto ok = CheckMultiplexing(message, signal); !ok) return std::move(ok).error();
+    }
   }
   return std::move(messages_);
 }
