@@ -47,11 +47,16 @@ std::optional<Heading> HeadingOf(const LogEvent& event) {
                         text_t>(event);
 }
 
-double Percentile(std::vector<std::int64_t> values, double share) {
+double Percentile(std::vector<double> values, double share) {
   if (values.empty()) return std::nan("");
   const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return static_cast<double>(values[static_cast<std::size_t>(rank)]);
+  return values[static_cast<std::size_t>(rank)];
+}
+
+/// Not in integers: the times are what a message says, and their difference may need 65 bits.
+double Difference(std::int64_t later, std::int64_t earlier) {
+  return static_cast<double>(later) - static_cast<double>(earlier);
 }
 
 constexpr double kUsPerMs = 1e3;
@@ -68,7 +73,7 @@ void LogSummary::Add(const LogEvent& event) {
   const auto heading = HeadingOf(event);
   if (!heading) return;
   if (heading->position) channel.monitor.Observe(*heading->position);
-  channel.ages_us.push_back(event.timestamp_us - heading->utime);
+  channel.ages_us.push_back(Difference(event.timestamp_us, heading->utime));
 }
 
 std::int64_t LogSummary::Events(const std::string& channel) const {
@@ -100,8 +105,7 @@ std::string LogSummary::FormatTable(const LogReader::Counters& counters) const {
                                  "p99 ms",
                                  "max ms");
   for (const auto& [name, channel] : channels_) {
-    const double seconds =
-        std::max(static_cast<double>(channel.last_us - channel.first_us) / kUsPerS, 1e-6);
+    const double seconds = std::max(Difference(channel.last_us, channel.first_us) / kUsPerS, 1e-6);
     const double intervals = static_cast<double>(std::max<std::int64_t>(channel.events - 1, 0));
     fmt::format_to(std::back_inserter(text),
                    "{:<24} {:>8} {:>8.2f} {:>9.1f} {:>6} {:>9.2f} {:>9.2f} {:>9.2f}\n",

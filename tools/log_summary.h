@@ -34,7 +34,7 @@ class LogSummary {
     std::int64_t last_us = 0;
     StreamMonitor monitor;
     /// From the measurement (utime) to its arrival at the recorder, us.
-    std::vector<std::int64_t> ages_us;
+    std::vector<double> ages_us;
   };
   std::map<std::string, ChannelSummary> channels_;
 };
