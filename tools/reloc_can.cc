@@ -44,13 +44,18 @@ struct Options {
 struct DecodedSignal {
   const DbcSignal* signal = nullptr;
   std::int64_t values = 0;
-  double minimum = std::numeric_limits<double>::infinity();
-  double maximum = -std::numeric_limits<double>::infinity();
-  double sum = 0.0;
-  double last = 0.0;
+  std::int64_t not_finite = 0;
+  long double minimum = std::numeric_limits<long double>::infinity();
+  long double maximum = -std::numeric_limits<long double>::infinity();
+  long double sum = 0.0;
+  long double last = 0.0;
   std::string last_name{};
 
-  void Add(double value, std::string name) {
+  void Add(long double value, std::string name) {
+    if (!std::isfinite(value)) {
+      ++not_finite;
+      return;
+    }
     ++values;
     minimum = std::min(minimum, value);
     maximum = std::max(maximum, value);
@@ -163,10 +168,20 @@ std::string Quoted(const std::string& text) {
   return quoted + '"';
 }
 
-/// Shortest digits that give the same number, without those that only rounding made: 0.3, and not
-/// 0.30000000000000004.
-std::string FormatValue(double value) {
-  return fmt::format("{:.15g}", value);
+/// A row of the CSV file that has one for each value.
+std::string Row(const CandumpRecord& record,
+                const DecodedMessage& decoded,
+                const DbcSignal& signal,
+                long double value,
+                const std::string& verdict) {
+  return fmt::format("{},{},{},{},{},{},{}\n",
+                     record.time_ns,
+                     decoded.message->name,
+                     signal.name,
+                     FormatValue(signal, value),
+                     Quoted(signal.unit),
+                     Quoted(ValueName(signal, record.frame.payload())),
+                     verdict == "valid" && !std::isfinite(value) ? "not_finite" : verdict);
 }
 
 void Decode(const CandumpRecord& record, bool wide, DecodedMessage& decoded, std::string& rows) {
@@ -177,23 +192,13 @@ void Decode(const CandumpRecord& record, bool wide, DecodedMessage& decoded, std
   if (wide) rows += fmt::format("{},{}", record.time_ns, verdict);
   for (DecodedSignal& signal : decoded.signals) {
     const auto payload = record.frame.payload();
-    std::optional<double> value;
+    std::optional<long double> value;
     if (IsPresent(*decoded.message, *signal.signal, payload))
-      value = DecodeSignal(*signal.signal, payload);
-    if (wide) rows += value ? "," + FormatValue(*value) : ",";
+      value = DecodeExactly(*signal.signal, payload);
+    if (wide) rows += value ? "," + FormatValue(*signal.signal, *value) : ",";
     if (!value) continue;
-    std::string name = ValueName(*signal.signal, payload);
-    if (!wide) {
-      rows += fmt::format("{},{},{},{},{},{},{}\n",
-                          record.time_ns,
-                          decoded.message->name,
-                          signal.signal->name,
-                          FormatValue(*value),
-                          Quoted(signal.signal->unit),
-                          Quoted(name),
-                          verdict);
-    }
-    if (is_valid) signal.Add(*value, std::move(name));
+    if (!wide) rows += Row(record, decoded, *signal.signal, *value, verdict);
+    if (is_valid) signal.Add(*value, ValueName(*signal.signal, payload));
   }
   if (wide) rows += '\n';
 }
@@ -206,10 +211,11 @@ std::string Header(const Options& options, const Decoder& decoder) {
   return header + "\n";
 }
 
-/// Frames of the log that no message was asked for count as unknown.
+/// The frames of the log, and those of which no message was asked for.
 struct Passed {
   std::int64_t frames = 0;
   std::int64_t other_frames = 0;
+  std::int64_t dataless_frames = 0;  ///< Remote or error frames.
 };
 
 Result<Passed> DecodeLog(const Options& options, Decoder& decoder, std::string& rows) {
@@ -223,13 +229,36 @@ Result<Passed> DecodeLog(const Options& options, Decoder& decoder, std::string& 
     const CandumpRecord& frame = **record;
     if (!options.interface.empty() && frame.interface != options.interface) continue;
     ++passed.frames;
+    if (frame.frame.error || frame.frame.remote) {
+      ++passed.dataless_frames;
+      continue;
+    }
     const auto decoded = decoder.find(frame.frame.id);
-    if (decoded == decoder.end() || frame.frame.error || frame.frame.remote) {
+    if (decoded == decoder.end()) {
       ++passed.other_frames;
       continue;
     }
     Decode(frame, options.wide, decoded->second, rows);
   }
+}
+
+void Print(const DecodedSignal& decoded) {
+  const DbcSignal& signal = *decoded.signal;
+  const std::string refused =
+      decoded.not_finite == 0 ? "" : fmt::format("; not finite {}", decoded.not_finite);
+  if (decoded.values == 0) {
+    fmt::print("  {:<28} no value{}\n", signal.name, refused);
+    return;
+  }
+  fmt::print("  {:<28} {:>14} min {:>14.6g} mean {:>14} max {:>14} last {}{}{}\n",
+             signal.name,
+             FormatValue(signal, decoded.minimum),
+             static_cast<double>(decoded.sum / static_cast<long double>(decoded.values)),
+             FormatValue(signal, decoded.maximum),
+             FormatValue(signal, decoded.last),
+             signal.unit,
+             decoded.last_name.empty() ? "" : " (" + decoded.last_name + ")",
+             refused);
 }
 
 void Print(const DecodedMessage& decoded) {
@@ -249,20 +278,8 @@ void Print(const DecodedMessage& decoded) {
       counts.stuck_counters,
       counts.short_frames,
       counts.missing_frames);
-  for (const DecodedSignal& signal : decoded.signals) {
-    if (signal.values == 0) {
-      fmt::print("  {:<28} no value\n", signal.signal->name);
-      continue;
-    }
-    fmt::print("  {:<28} {:>14.6g} min {:>14.6g} mean {:>14.6g} max {:>14.6g} last {}{}\n",
-               signal.signal->name,
-               signal.minimum,
-               signal.sum / static_cast<double>(signal.values),
-               signal.maximum,
-               signal.last,
-               signal.signal->unit,
-               signal.last_name.empty() ? "" : " (" + signal.last_name + ")");
-  }
+  for (const DecodedSignal& signal : decoded.signals)
+    Print(signal);
 }
 
 Result<void> RunDecode(const Options& options) {
@@ -289,7 +306,10 @@ Result<void> RunDecode(const Options& options) {
   for (const auto& [id, decoded] : *decoder) {
     if (decoded.guard.counters().frames > 0) Print(decoded);
   }
-  fmt::print("{} frames, {} of other messages\n", passed->frames, passed->other_frames);
+  fmt::print("{} frames, {} of other messages, {} remote or error frames\n",
+             passed->frames,
+             passed->other_frames,
+             passed->dataless_frames);
   return {};
 }
 
@@ -301,7 +321,9 @@ int main(int argc, char** argv) {
       "What is said on a recorded CAN bus.\n\n"
       "decode reads a candump log with a DBC file, prints each message with its rate and faults, "
       "and each signal with its range, and writes all values as CSV. Signals that a multiplexor "
-      "leaves out of a frame have no row. With --config the rules of can.messages (counter, "
+      "leaves out of a frame have no row; values that are not finite have one that says so, and "
+      "are "
+      "counted, not in the ranges. With --config the rules of can.messages (counter, "
       "checksum) tell which frames are valid; those that are not are in the CSV file, named, and "
       "not in the ranges.",
       "reloc can");

@@ -51,6 +51,10 @@ struct DbcSignal {
   /// A signal of the same message. Empty with ranges: the file does not say which, so that the
   /// signal is never found.
   std::string multiplexor{};
+
+  [[nodiscard]] bool is_integer() const {
+    return type == RawType::kUnsigned || type == RawType::kSigned;
+  }
 };
 
 struct DbcMessage {

@@ -19,9 +19,7 @@ Error Invalid(std::string message) {
 /// The integer signal of a message that a rule names.
 Result<DbcSignal> FindInteger(const DbcMessage& message, const char* key, const std::string& name) {
   const DbcSignal* const signal = message.FindSignal(name);
-  const bool is_integer =
-      signal != nullptr && (signal->type == RawType::kUnsigned || signal->type == RawType::kSigned);
-  if (!is_integer || !signal->mux_ranges.empty()) {
+  if (signal == nullptr || !signal->is_integer() || !signal->mux_ranges.empty()) {
     return Invalid(fmt::format("{} is '{}', must be an integer of message {} that is in each frame",
                                key,
                                name,

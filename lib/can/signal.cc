@@ -4,10 +4,12 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "core/check.h"
+#include "core/parse_number.h"
 
 namespace relocd {
 namespace {
@@ -32,18 +34,40 @@ std::int64_t SignExtend(std::uint64_t bits, int length) {
   return static_cast<std::int64_t>(bits << shift) >> shift;
 }
 
-double RawValue(const DbcSignal& signal, std::uint64_t bits) {
+template <typename Float>
+Float RawValue(const DbcSignal& signal, std::uint64_t bits) {
   switch (signal.type) {
     case RawType::kUnsigned:
-      return static_cast<double>(bits);
+      return static_cast<Float>(bits);
     case RawType::kSigned:
-      return static_cast<double>(SignExtend(bits, signal.length));
+      return static_cast<Float>(SignExtend(bits, signal.length));
     case RawType::kFloat:
-      return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
+      return static_cast<Float>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
     case RawType::kDouble:
-      return std::bit_cast<double>(bits);
+      return static_cast<Float>(std::bit_cast<double>(bits));
   }
-  return std::numeric_limits<double>::quiet_NaN();
+  return std::numeric_limits<Float>::quiet_NaN();
+}
+
+template <typename Float>
+std::optional<Float> PhysicalValue(const DbcSignal& signal, std::span<const std::uint8_t> payload) {
+  const auto bits = DecodeBits(signal, payload);
+  if (!bits) return std::nullopt;
+  return RawValue<Float>(signal, *bits) * static_cast<Float>(signal.factor) +
+         static_cast<Float>(signal.offset);
+}
+
+/// Digits behind the point: 2 of 0.25, 7 of 1.5e-06.
+int Decimals(double number) {
+  const std::string text = fmt::format("{}", number);
+  const std::size_t mantissa_end = std::min(text.find('e'), text.size());
+  const std::size_t point = std::min(text.find('.'), mantissa_end);
+  const int fraction = point == mantissa_end ? 0 : static_cast<int>(mantissa_end - point) - 1;
+  const int exponent =
+      mantissa_end == text.size()
+          ? 0
+          : static_cast<int>(ParseInt64(text.substr(mantissa_end + 1)).value_or(0));
+  return std::max(fraction - exponent, 0);
 }
 
 /// The bits of the integer nearest to `raw`; nothing outside of the signal's range.
@@ -98,11 +122,31 @@ std::optional<std::uint64_t> DecodeBits(const DbcSignal& signal,
 }
 
 std::optional<double> DecodeSignal(const DbcSignal& signal, std::span<const std::uint8_t> payload) {
-  const auto bits = DecodeBits(signal, payload);
-  if (!bits) return std::nullopt;
-  const double value = RawValue(signal, *bits) * signal.factor + signal.offset;
-  if (!std::isfinite(value)) return std::nullopt;
-  return value;
+  const auto value = PhysicalValue<double>(signal, payload);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+std::optional<long double> DecodeExactly(const DbcSignal& signal,
+                                         std::span<const std::uint8_t> payload) {
+  return PhysicalValue<long double>(signal, payload);
+}
+
+std::string FormatValue(const DbcSignal& signal, long double value) {
+  if (signal.type == RawType::kFloat && signal.factor == 1.0 && signal.offset == 0.0) {
+    return fmt::format("{}", static_cast<float>(value));
+  }
+  const int decimals = std::max(Decimals(signal.factor), Decimals(signal.offset));
+  // Above it the error of a factor such as 0.1, which no double holds, shows in the last decimal.
+  const long double limit = decimals == 0 ? 0x1p64L : 4e15L;
+  const bool is_short = decimals < 18 && std::abs(value) * std::pow(10.0L, decimals) < limit;
+  if (signal.is_integer() && is_short) {
+    const std::string text = fmt::format("{:.{}f}", value, decimals);
+    if (decimals == 0) return text;
+    const std::string_view digits =
+        std::string_view(text).substr(0, text.find_last_not_of('0') + 1);
+    return std::string(digits.ends_with('.') ? digits.substr(0, digits.size() - 1) : digits);
+  }
+  return fmt::format("{}", static_cast<double>(value));
 }
 
 bool IsPresent(const DbcMessage& message,

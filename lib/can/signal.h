@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "can/can_frame.h"
 #include "can/dbc.h"
@@ -25,6 +26,16 @@ std::optional<std::uint64_t> DecodeBits(const DbcSignal& signal,
 /// The physical value: raw * factor + offset. Nothing when the payload is too short, or the raw
 /// value is a floating-point number that is not finite.
 std::optional<double> DecodeSignal(const DbcSignal& signal, std::span<const std::uint8_t> payload);
+
+/// The same in the digits of long double, which holds integers of 64 bits on the processors that we
+/// build for, and NaN or infinite where that is what the frame says. Nothing when the payload is
+/// too short.
+std::optional<long double> DecodeExactly(const DbcSignal& signal,
+                                         std::span<const std::uint8_t> payload);
+
+/// The value as a person writes it: with the decimals that factor and offset give an integer, 0.3
+/// and not 0.30000000000000004, and else the fewest digits that give the same number.
+std::string FormatValue(const DbcSignal& signal, long double value);
 
 /// Whether a frame of `message` with this payload has the signal, which its multiplexors decide.
 bool IsPresent(const DbcMessage& message,

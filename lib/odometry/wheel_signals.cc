@@ -27,10 +27,6 @@ Result<std::string> NameInMessage(const char* key,
       fmt::format("{} is '{}', must be a signal of message {}", key, full_name, message.name));
 }
 
-bool IsInteger(const DbcSignal& signal) {
-  return signal.type == RawType::kUnsigned || signal.type == RawType::kSigned;
-}
-
 /// The rule given for the message, with the counter and the checksum that the config names for the
 /// wheels' message put over it.
 Result<MessageRule> RuleFor(const DbcMessage& message,
@@ -114,14 +110,14 @@ Result<void> WheelSignals::AddInput(const std::string& name, const DbcFile& dbc)
   auto found = dbc.FindSignal(name);
   if (!found) return std::move(found).error();
   const DbcSignal& signal = *found->signal;
-  if (are_ticks_ && (!IsInteger(signal) || signal.length > 63)) {
+  if (are_ticks_ && (!signal.is_integer() || signal.length > 63)) {
     return Invalid(
         fmt::format("{}: signal '{}' is a {}-bit {}, must be an integer of at most 63 "
                     "bits to count ticks",
                     dbc.path(),
                     name,
                     signal.length,
-                    IsInteger(signal) ? "integer" : "floating-point number"));
+                    signal.is_integer() ? "integer" : "floating-point number"));
   }
   inputs_.push_back({.name = name,
                      .message = *found->message,

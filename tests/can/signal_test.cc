@@ -1,7 +1,9 @@
 #include "can/signal.h"
 
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <string>
 #include <vector>
@@ -168,6 +170,50 @@ TEST(SignalTest, DecodesAPhysicalValueToHalfAStep) {
     const auto decoded = DecodeSignal(signal, payload);
     ASSERT_TRUE(decoded);
     ASSERT_NEAR(*decoded, value, 0.5000001 * signal.factor);
+  }
+}
+
+struct FormatCase {
+  DbcSignal signal;
+  std::uint64_t bits;
+  std::string expected;
+};
+
+TEST(FormatValueTest, WritesTheDigitsThatTheFrameGives) {
+  const DbcSignal word{.start_bit = 0, .length = 64};
+  const auto of = [&](RawType type, double factor = 1.0, double offset = 0.0) {
+    DbcSignal signal = word;
+    signal.type = type;
+    signal.factor = factor;
+    signal.offset = offset;
+    if (type == RawType::kFloat) signal.length = 32;
+    return signal;
+  };
+  const std::vector<FormatCase> cases = {
+      {word, 18446744073709551615U, "18446744073709551615"},
+      {word, 9007199254740993U, "9007199254740993"},
+      {of(RawType::kSigned), std::uint64_t{1} << 63U, "-9223372036854775808"},
+      {of(RawType::kSigned, 1.0, -1.0), 9223372036854775807U, "9223372036854775806"},
+      {of(RawType::kUnsigned, 3.0, 7.0), 6000000000000000001U, "18000000000000000010"},
+      {of(RawType::kUnsigned, 4.0), 18446744073709551615U, "7.378697629483821e+19"},
+      {of(RawType::kUnsigned, 0.1), 3, "0.3"},
+      {of(RawType::kUnsigned, 0.1, -3276.8), 32769, "0.1"},
+      {of(RawType::kUnsigned, 0.1), 10, "1"},
+      {of(RawType::kUnsigned, 0.001), 3999999999999999U, "3999999999999.999"},
+      {of(RawType::kUnsigned, 1e-6), 5, "0.000005"},
+      {of(RawType::kUnsigned, 1e-30), 1, "1e-30"},
+      {of(RawType::kUnsigned, -0.5), 0, "0"},
+      {of(RawType::kFloat), std::bit_cast<std::uint32_t>(0.1F), "0.1"},
+      {of(RawType::kFloat, 2.0), std::bit_cast<std::uint32_t>(0.1F), "0.20000000298023224"},
+      {of(RawType::kDouble), std::bit_cast<std::uint64_t>(0.1 + 0.2), "0.30000000000000004"},
+      {of(RawType::kFloat), 0x7FC00000U, "nan"},
+      {of(RawType::kDouble), std::bit_cast<std::uint64_t>(-HUGE_VAL), "-inf"}};
+  for (const FormatCase& format_case : cases) {
+    std::array<std::uint8_t, 8> payload{};
+    EncodeBits(format_case.signal, format_case.bits, payload);
+    const auto value = DecodeExactly(format_case.signal, payload);
+    ASSERT_TRUE(value);
+    EXPECT_EQ(FormatValue(format_case.signal, *value), format_case.expected);
   }
 }
 

@@ -83,6 +83,32 @@ TEST_F(RelocCanTest, NamesFramesThatARuleRefusesAndKeepsThemOutOfTheRanges) {
               HasSubstr("1200000000,WHEELS,SPEED,1,m/s,,bad_checksum\n"));
 }
 
+TEST_F(RelocCanTest, WritesIntegersOf64BitsDigitByDigit) {
+  dbc_ = folder_.Write("v.dbc", "BO_ 418 WIDE: 8 X\n SG_ COUNT : 0|64@1+ (1,0) [0|0] \"\" X\n");
+  log_ = folder_.Write("can.log",
+                       "(1.0) can0 1A2#FEFFFFFFFFFFFFFF\n(1.1) can0 1A2#FFFFFFFFFFFFFFFF\n");
+  EXPECT_THAT(Decode(""), HasSubstr("1000000000,WIDE,COUNT,18446744073709551614,,,valid\n"));
+  EXPECT_THAT(Decode("--wide"), HasSubstr("1100000000,valid,18446744073709551615\n"));
+  const std::string output = Run("--dbc " + dbc_).output;
+  EXPECT_THAT(output, HasSubstr("18446744073709551614 min"));
+  EXPECT_THAT(output, HasSubstr("18446744073709551615 max 18446744073709551615 last"));
+}
+
+TEST_F(RelocCanTest, NamesAndCountsValuesThatAreNotFinite) {
+  dbc_ = folder_.Write("v.dbc",
+                       "BO_ 419 REAL: 4 X\n SG_ TORQUE : 0|32@1- (1,0) [0|0] \"\" X\n"
+                       "SIG_VALTYPE_ 419 TORQUE : 1;\n");
+  log_ = folder_.Write("can.log",
+                       "(1.0) can0 1A3#0000C07F\n(1.1) can0 1A3#0000803F\n(1.2) can0 1A3#R\n");
+  EXPECT_THAT(Decode(""),
+              HasSubstr("1000000000,REAL,TORQUE,nan,,,not_finite\n"
+                        "1100000000,REAL,TORQUE,1,,,valid\n"));
+  EXPECT_THAT(Decode("--wide"), HasSubstr("1000000000,valid,nan\n"));
+  const std::string output = Run("--dbc " + dbc_).output;
+  EXPECT_THAT(output, HasSubstr("1 last ; not finite 1\n"));
+  EXPECT_THAT(output, HasSubstr("3 frames, 0 of other messages, 1 remote or error frames\n"));
+}
+
 TEST_F(RelocCanTest, SaysWhatIsMissing) {
   EXPECT_THAT(Run("").output, HasSubstr("no DBC file, must be given by --dbc or --config"));
   const Ended unknown = Run("--dbc " + dbc_ + " --message WHEEL");
