@@ -140,11 +140,10 @@ std::string FormatValue(const DbcSignal& signal, long double value) {
   const long double limit = decimals == 0 ? 0x1p64L : 4e15L;
   const bool is_short = decimals < 18 && std::abs(value) * std::pow(10.0L, decimals) < limit;
   if (signal.is_integer() && is_short) {
-    const std::string text = fmt::format("{:.{}f}", value, decimals);
-    if (decimals == 0) return text;
-    const std::string_view digits =
-        std::string_view(text).substr(0, text.find_last_not_of('0') + 1);
-    return std::string(digits.ends_with('.') ? digits.substr(0, digits.size() - 1) : digits);
+    std::string text = fmt::format("{:.{}f}", value, decimals);
+    if (decimals > 0) text.erase(text.find_last_not_of('0') + 1);
+    if (text.ends_with('.')) text.pop_back();
+    return text;
   }
   return fmt::format("{}", static_cast<double>(value));
 }
