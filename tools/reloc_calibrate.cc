@@ -154,6 +154,9 @@ Result<void> RunOdometry(const Options& options) {
                           ? RecordMotions(options.odometry, config->odometry.drive.track_m)
                           : Record(options, *config, config->odometry);
   if (!before) return before.error();
+  if (!before->left_out.empty()) {
+    fmt::print(stderr, "reloc calibrate odometry: {}\n", before->left_out);
+  }
   const auto references = ReadReference(options.reference, before->origin_ns);
   if (!references) return references.error();
 

@@ -225,7 +225,7 @@ Result<Passed> DecodeLog(const Options& options, Decoder& decoder, std::string& 
   while (true) {
     auto record = log->Next();
     if (!record) return std::move(record).error();
-    if (!record->has_value()) return passed;
+    if (!record->has_value()) break;
     const CandumpRecord& frame = **record;
     if (!options.interface.empty() && frame.interface != options.interface) continue;
     ++passed.frames;
@@ -240,6 +240,10 @@ Result<Passed> DecodeLog(const Options& options, Decoder& decoder, std::string& 
     }
     Decode(frame, options.wide, decoded->second, rows);
   }
+  if (const std::string left_out = log->LeftOut(); !left_out.empty()) {
+    fmt::print(stderr, "reloc can decode: {}\n", left_out);
+  }
+  return passed;
 }
 
 void Print(const DecodedSignal& decoded) {

@@ -163,6 +163,9 @@ Result<Tables> Process(const Options& options,
     AppendOdometry(*increment, tables.odometry);
     Add(*increment, tables.summary);
   }
+  if (const std::string left_out = log->LeftOut(); !left_out.empty()) {
+    fmt::print(stderr, "reloc odometry: {}\n", left_out);
+  }
   if (tables.summary.increments == 0) {
     return Error{ErrorKind::kInvalidInput,
                  fmt::format("{}: has no wheel measurement on {}, must have the frames of the DBC "

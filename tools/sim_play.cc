@@ -44,6 +44,9 @@ Result<std::vector<CandumpRecord>> ReadCan(const std::string& path, std::int64_t
     (*record)->time_ns -= start_ns;
     if ((*record)->time_ns >= 0) records.push_back(**record);
   }
+  if (const std::string left_out = log->LeftOut(); !left_out.empty()) {
+    fmt::print(stderr, "reloc sim play: {}\n", left_out);
+  }
   // Each interface has an order of its own.
   std::stable_sort(
       records.begin(), records.end(), [](const CandumpRecord& a, const CandumpRecord& b) {

@@ -62,12 +62,11 @@ void OdometryRecorder::AddSample(const OdometryIncrement& increment) {
         turn * drive.right_radius_m * drive.right_scale * static_cast<double>(ticks[1]);
   } else {
     const auto speeds_mps = Speeds();
-    if (!samples.empty()) {
-      const double half_s = 0.5 * (sample.time_s - samples.back().time_s);
-      for (std::size_t i = 0; i < speeds_mps.size(); ++i) {
-        sample.travel_m.at(i) =
-            samples.back().travel_m.at(i) + half_s * (last_speeds_mps_.at(i) + speeds_mps.at(i));
-      }
+    const OdometryRecording::Sample& before = samples.empty() ? sample : samples.back();
+    const double half_s = 0.5 * (sample.time_s - before.time_s);
+    for (std::size_t i = 0; i < speeds_mps.size(); ++i) {
+      sample.travel_m.at(i) =
+          before.travel_m.at(i) + half_s * (last_speeds_mps_.at(i) + speeds_mps.at(i));
     }
     last_speeds_mps_ = speeds_mps;
   }
@@ -101,7 +100,9 @@ Result<OdometryRecording> RecordOdometry(const std::string& can_log,
                              recorder.recording().samples.size(),
                              interface)};
   }
-  return recorder.recording();
+  OdometryRecording recording = recorder.recording();
+  recording.left_out = log->LeftOut();
+  return recording;
 }
 
 Result<OdometryRecording> RecordMotions(const std::string& csv, double track_m) {

@@ -32,6 +32,8 @@ struct OdometryRecording {
   bool has_steering = false;
   /// What odometry made of it with the config: X_OB at the samples' times.
   Trajectory2 X_OBs;
+  /// What of the log was no frame and left out, for a person; empty if nothing was.
+  std::string left_out;
 };
 
 /// Collects the recording of frames, by the product's own odometry.

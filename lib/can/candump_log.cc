@@ -201,6 +201,9 @@ Result<std::optional<CandumpRecord>> CandumpLog::Next() {
     const std::string_view text = Trim(line);
     if (text.empty() || text.starts_with('#')) continue;
     auto record = ParseCandumpLine(text);
+    // Without a line's end the stream is at its own.
+    is_cut_ = !record && stream_->eof() && !last_times_ns_.empty();
+    if (is_cut_) break;
     if (record) {
       if (auto ok = CheckOrder(*record); !ok) record = std::move(ok).error();
     }
@@ -211,6 +214,10 @@ Result<std::optional<CandumpRecord>> CandumpLog::Next() {
   }
   if (stream_->bad()) return Error{ErrorKind::kUnavailable, fmt::format("reading {}", path_)};
   return std::optional<CandumpRecord>();
+}
+
+std::string CandumpLog::LeftOut() const {
+  return is_cut_ ? fmt::format("{}: line {} is cut off and left out", path_, line_number_) : "";
 }
 
 Result<std::optional<CanFrame>> CandumpLog::NextDataFrame(std::string_view interface) {

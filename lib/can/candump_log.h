@@ -39,16 +39,20 @@ class CandumpLog {
   static CandumpLog FromText(std::string text, std::string path);
 
   /// The next frame, or nothing at the end. Empty lines and those that start with `#` are passed
-  /// over.
+  /// over. So is a last line without an end that is none, behind others: what a killed writer
+  /// leaves.
   ///
-  /// @return kInvalidInput with file and line for a line that is none, and for a time before that
-  ///         of the frame before it on the same interface.
+  /// @return kInvalidInput with file and line for any other line that is none, and for a time
+  ///         before that of the frame before it on the same interface.
   Result<std::optional<CandumpRecord>> Next();
 
   /// The next frame of `interface` that holds data: neither an error frame nor a remote one.
   ///
   /// @return as Next.
   Result<std::optional<CanFrame>> NextDataFrame(std::string_view interface);
+
+  /// What of the log was no frame and left out so far, for a person; empty if nothing was.
+  [[nodiscard]] std::string LeftOut() const;
 
  private:
   CandumpLog(std::unique_ptr<std::istream> stream, std::string path);
@@ -58,6 +62,7 @@ class CandumpLog {
   std::unique_ptr<std::istream> stream_;
   std::string path_;
   std::size_t line_number_ = 0;
+  bool is_cut_ = false;  ///< The line of that number, which is the last.
   std::map<std::string, std::int64_t> last_times_ns_;  ///< By interface.
 };
 

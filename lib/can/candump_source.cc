@@ -94,7 +94,10 @@ Result<void> CandumpSource::ReadNext() {
   while (true) {
     auto frame = log_->NextDataFrame(interface_);
     if (!frame) return std::move(frame).error();
-    if (!frame->has_value()) return {};
+    if (!frame->has_value()) {
+      if (!log_->LeftOut().empty()) ++status_.malformed;
+      return {};
+    }
     if (!IsWanted((*frame)->id)) continue;
     next_ = *frame;
     next_->receive_time = epoch_ + Duration(ToNanoseconds((*frame)->receive_time) - start_ns_);

@@ -83,6 +83,14 @@ TEST(CandumpSourceTest, SaysWhichLineIsNone) {
   EXPECT_FALSE(source.is_open());
 }
 
+TEST(CandumpSourceTest, CountsALastLineThatIsCutOff) {
+  const auto path = WriteTemporary("cut.log", "(1.0) can0 0AA#01\n(1.1) can0 0A");
+  CandumpSource source(LogConfig(path), {}, MonotonicClock::now());
+  ASSERT_TRUE(source.Open());
+  ASSERT_TRUE(source.Receive());
+  EXPECT_EQ(source.status().malformed, 1);
+}
+
 TEST(CandumpSourceTest, RefusesToWaitForAnotherClock) {
   CanConfig config = LogConfig(WriteTemporary("clock.log", "(46408.58) can0 0AA#01\n"));
   config.playback_start_s = 0.0;

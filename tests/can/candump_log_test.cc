@@ -161,6 +161,29 @@ TEST(CandumpLogTest, EndsWithNothing) {
   EXPECT_FALSE(end->has_value());
 }
 
+TEST(CandumpLogTest, LeavesOutALastLineThatIsCutOffAndSaysSo) {
+  const std::string line = "(1.500000) can0 123#0102";
+  for (const std::size_t size : {1U, 5U, 13U, 18U, 21U, 23U}) {
+    CandumpLog log = CandumpLog::FromText("(1.0) can0 123#01\n" + line.substr(0, size), "x.log");
+    ASSERT_TRUE(log.Next());
+    EXPECT_EQ(log.LeftOut(), "");
+    const auto end = log.Next();
+    ASSERT_TRUE(end) << size;
+    EXPECT_FALSE(end->has_value());
+    EXPECT_EQ(log.LeftOut(), "x.log: line 2 is cut off and left out");
+  }
+}
+
+TEST(CandumpLogTest, IsNoLogWithNothingButALineThatIsNone) {
+  CandumpLog log = CandumpLog::FromText(
+      "\x7f"
+      "ELF",
+      "x.log");
+  EXPECT_EQ(log.Next().error().message,
+            "x.log: line 1: time '\x7f"
+            "ELF', must be (SECONDS.MICROSECONDS)");
+}
+
 TEST(CandumpLogTest, GivesTheDataFramesOfOneInterface) {
   CandumpLog log = CandumpLog::FromText(
       "(1.0) can1 123#01\n(1.1) can0 20000080#0000000000000000\n(1.2) can0 123#R\n"

@@ -109,6 +109,15 @@ TEST_F(RelocCanTest, NamesAndCountsValuesThatAreNotFinite) {
   EXPECT_THAT(output, HasSubstr("3 frames, 0 of other messages, 1 remote or error frames\n"));
 }
 
+TEST_F(RelocCanTest, SaysThatTheLastLineIsCutOff) {
+  log_ = folder_.Write("can.log", "(1.0) can0 1A0#009CFF63\n(1.1) can0 1A0#0");
+  const Ended ended = Run("--dbc " + dbc_);
+  EXPECT_EQ(ended.exit_code, 0);
+  EXPECT_THAT(ended.output,
+              HasSubstr("reloc can decode: " + log_ + ": line 2 is cut off and left out\n"));
+  EXPECT_THAT(ended.output, HasSubstr("1 frames, 0 of other messages"));
+}
+
 TEST_F(RelocCanTest, SaysWhatIsMissing) {
   EXPECT_THAT(Run("").output, HasSubstr("no DBC file, must be given by --dbc or --config"));
   const Ended unknown = Run("--dbc " + dbc_ + " --message WHEEL");
