@@ -15,6 +15,8 @@ if(RELOCD_SANITIZERS)
   target_link_options(relocd_build_flags INTERFACE -fsanitize=${RELOCD_SANITIZERS})
   # Under the address sanitizer Eigen allocates in another way than in Debian's Ceres, which then frees what it must not.
   target_compile_definitions(relocd_build_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  # A function's clone for this CPU is chosen while the program is loaded, before the thread sanitizer is up: its checks would crash there.
+  target_compile_options(relocd_build_flags INTERFACE "-Dtarget_clones(...)=")
 endif()
 
 # relocd_add_library(<module> SOURCES ... [DEPENDS ...] [PRIVATE_DEPENDS ...])

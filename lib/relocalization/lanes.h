@@ -14,10 +14,9 @@ using FloatLanes [[gnu::vector_size(kLanes * sizeof(float)), gnu::aligned(4), gn
     float;
 
 /// Before a function: compile it once for any CPU and once for those with AVX2, and choose when the
-/// program starts. Not under sanitizers, which are not yet up when the choice is made.
-#if defined(__x86_64__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define RELOCD_CLONE_FOR_AVX2 [[gnu::target_clones("default", "avx2")]]
+/// program starts.
+#if defined(__x86_64__) && !defined(__clang__)
+#define RELOCD_CLONE_FOR_AVX2 __attribute__((target_clones("default", "avx2")))
 #else
 #define RELOCD_CLONE_FOR_AVX2
 #endif
