@@ -3,6 +3,7 @@
 #include "daemon/daemon.h"
 #include "inferenced/inference_node.h"
 #include "relocalization/map_localizer.h"
+#include "runtime/start_extension.h"
 
 namespace relocd {
 namespace {
@@ -36,7 +37,9 @@ class InferenceDaemon final : public Daemon {
 
 Result<std::unique_ptr<Daemon>> MakeInference(DaemonContext& context) {
   const InferenceConfig& config = context.config.inference;
-  auto localizer = MapLocalizer::Load(config);
+  StartExtension start(context.service_manager,
+                       FromSeconds(context.config.supervisor.inferenced.start_timeout_s));
+  auto localizer = MapLocalizer::Load(config, [&start] { start.Step(MonotonicClock::now()); });
   if (!localizer) return std::move(localizer).error().WithContext("inference");
   return std::unique_ptr<Daemon>(std::make_unique<InferenceDaemon>(context, std::move(*localizer)));
 }

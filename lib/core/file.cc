@@ -77,7 +77,7 @@ Error SystemError(ErrorKind kind, std::string_view doing) {
   return {kind, fmt::format("{}: {}", doing, std::generic_category().message(error))};
 }
 
-Result<std::string> ReadFile(const std::string& path) {
+Result<std::string> ReadFile(const std::string& path, const Progress& progress) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!fd.valid()) return SystemError(ErrorKind::kUnavailable, fmt::format("opening {}", path));
   std::string content;
@@ -88,6 +88,7 @@ Result<std::string> ReadFile(const std::string& path) {
     if (size < 0) return SystemError(ErrorKind::kUnavailable, fmt::format("reading {}", path));
     if (size == 0) return content;
     content.append(chunk, 0, static_cast<std::size_t>(size));
+    progress();
   }
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/progress.h"
 #include "core/result.h"
 
 namespace relocd {
@@ -11,7 +12,7 @@ namespace relocd {
 Error SystemError(ErrorKind kind, std::string_view doing);
 
 /// The whole file. @return kUnavailable when it cannot be read.
-Result<std::string> ReadFile(const std::string& path);
+Result<std::string> ReadFile(const std::string& path, const Progress& progress = Unwatched);
 
 /// Creates the file or replaces its content, without waiting for the disk. A reader may see a part.
 ///

@@ -46,22 +46,24 @@ MapLocalizer::MapLocalizer(SceneMap map, const InferenceConfig& config)
       selector_(map_.regions, static_cast<std::size_t>(config.regions_per_image)) {}
 
 Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Create(SceneMap map,
-                                                           const InferenceConfig& config) {
+                                                           const InferenceConfig& config,
+                                                           const Progress& progress) {
   std::unique_ptr<MapLocalizer> localizer(new MapLocalizer(std::move(map), config));
-  auto predictor = SceneCoordinatePredictor::Create(localizer->map_, config.threads);
+  auto predictor = SceneCoordinatePredictor::Create(localizer->map_, config.threads, progress);
   if (!predictor) return std::move(predictor).error();
   localizer->predictor_ = std::move(*predictor);
   return localizer;
 }
 
-Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Load(const InferenceConfig& config) {
+Result<std::unique_ptr<MapLocalizer>> MapLocalizer::Load(const InferenceConfig& config,
+                                                         const Progress& progress) {
   if (config.map_path.empty()) {
     return Error{ErrorKind::kInvalidInput,
                  "map_path is empty, must name a map (`reloc map train` makes one)"};
   }
-  auto map = ReadMap(config.map_path);
+  auto map = ReadMap(config.map_path, progress);
   if (!map) return std::move(map).error();
-  return Create(std::move(*map), config);
+  return Create(std::move(*map), config, progress);
 }
 
 Pose3 MapLocalizer::AtTrainedHeight(const Pose3& X_WC) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "camera/pinhole_camera.h"
+#include "core/progress.h"
 #include "relocalization/image_localizer.h"
 #include "relocalization/inference_config.h"
 #include "relocalization/region_selector.h"
@@ -23,10 +24,13 @@ class MapLocalizer final : public ImageLocalizer {
  public:
   /// @param config  valid; the calibration of its pose options is replaced by that of each region,
   ///                and its map_path is not looked at.
-  static Result<std::unique_ptr<MapLocalizer>> Create(SceneMap map, const InferenceConfig& config);
+  static Result<std::unique_ptr<MapLocalizer>> Create(SceneMap map,
+                                                      const InferenceConfig& config,
+                                                      const Progress& progress = Unwatched);
 
   /// Reads the map of the config. @return as ReadMap, and kInvalidInput for an empty path.
-  static Result<std::unique_ptr<MapLocalizer>> Load(const InferenceConfig& config);
+  static Result<std::unique_ptr<MapLocalizer>> Load(const InferenceConfig& config,
+                                                    const Progress& progress = Unwatched);
 
   [[nodiscard]] const CameraIntrinsics& camera() const override { return map_.camera; }
   [[nodiscard]] const std::string& map_id() const override { return map_.id; }

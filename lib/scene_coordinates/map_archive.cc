@@ -59,6 +59,7 @@ void MapReader::Halves(const char* field, std::vector<float>& values, std::size_
       return;
     }
   }
+  progress_();
 }
 
 }  // namespace relocd

@@ -15,6 +15,7 @@
 #include <Eigen/Core>
 #include <fmt/format.h>
 
+#include "core/progress.h"
 #include "core/result.h"
 
 namespace relocd {
@@ -59,7 +60,9 @@ class MapReader {
  public:
   static constexpr bool kReads = true;
 
-  explicit MapReader(std::string_view bytes) : rest_(bytes) {}
+  /// @param progress  called after each array.
+  MapReader(std::string_view bytes, Progress progress)
+      : rest_(bytes), progress_(std::move(progress)) {}
 
   /// A number that must be in [low, high], which for floating point also excludes NaN.
   template <typename T>
@@ -88,6 +91,7 @@ class MapReader {
   bool Take(const char* field, void* out, std::size_t size);
 
   std::string_view rest_;
+  Progress progress_;
   std::optional<Error> error_;
 };
 

@@ -225,7 +225,9 @@ std::string SerializeMap(const SceneMap& map) {
   return bytes + content;
 }
 
-Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
+Result<SceneMap> ParseMap(std::string_view bytes,
+                          const std::string& name,
+                          const Progress& progress) {
   Header header;
   const std::size_t magic_size = std::min(bytes.size(), kMagic.size());
   if (bytes.empty() || bytes.substr(0, magic_size) != kMagic.substr(0, magic_size)) {
@@ -256,7 +258,7 @@ Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
                                header.content_size,
                                content.size() < header.content_size ? "truncated" : "too long"));
   }
-  const std::string digest = Sha256Hex(content);
+  const std::string digest = Sha256Hex(content, progress);
   const std::string_view expected(header.sha256.data(), header.sha256.size());
   if (digest != expected) {
     return Refusal(
@@ -265,7 +267,7 @@ Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
             "sha256 of the content is {}, must be {}: it is damaged", digest, Printable(expected)));
   }
   SceneMap map;
-  MapReader reader(content);
+  MapReader reader(content, progress);
   VisitMap(reader, map);
   if (!reader.failed() && reader.rest_size() != 0) {
     reader.Fail(fmt::format("{} bytes follow the last region, must be 0", reader.rest_size()));
@@ -278,12 +280,12 @@ Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name) {
   return map;
 }
 
-Result<SceneMap> ReadMap(const std::string& path) {
-  const auto bytes = ReadFile(path);
+Result<SceneMap> ReadMap(const std::string& path, const Progress& progress) {
+  const auto bytes = ReadFile(path, progress);
   if (!bytes) {
     return Refusal(path, bytes.error().message + "; a map is made by 'reloc map train'");
   }
-  return ParseMap(*bytes, path);
+  return ParseMap(*bytes, path, progress);
 }
 
 Result<void> WriteMap(const SceneMap& map, const std::string& path) {

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "camera/intrinsics.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "features/feature_whitening.h"
 #include "features/gradient_maps.h"
@@ -79,10 +80,12 @@ std::string SerializeMap(const SceneMap& map);
 /// @return kInvalidInput when the bytes are no map, are cut short, of another format version, do
 ///         not match their hash, or hold a value out of range; each names what was found and what
 ///         is allowed. Safe for any bytes.
-Result<SceneMap> ParseMap(std::string_view bytes, const std::string& name);
+Result<SceneMap> ParseMap(std::string_view bytes,
+                          const std::string& name,
+                          const Progress& progress = Unwatched);
 
 /// @return as ParseMap, and kInvalidInput when there is no such file.
-Result<SceneMap> ReadMap(const std::string& path);
+Result<SceneMap> ReadMap(const std::string& path, const Progress& progress = Unwatched);
 /// Replaces the file as a whole or not at all.
 Result<void> WriteMap(const SceneMap& map, const std::string& path);
 

@@ -40,7 +40,7 @@ Result<Precision> MeasureFastest(const Head& head, const std::shared_ptr<ThreadT
 }  // namespace
 
 Result<std::unique_ptr<SceneCoordinatePredictor>> SceneCoordinatePredictor::Create(
-    const SceneMap& map, int threads) {
+    const SceneMap& map, int threads, const Progress& progress) {
   std::unique_ptr<SceneCoordinatePredictor> predictor(new SceneCoordinatePredictor(map));
   const auto team = std::make_shared<ThreadTeam>(threads);
   auto extractor = GradientHistograms::Create(map.features, team);
@@ -58,6 +58,7 @@ Result<std::unique_ptr<SceneCoordinatePredictor>> SceneCoordinatePredictor::Crea
     auto head = OnednnLayers::ForHead(region.head, predictor->precision_, team);
     if (!head) return std::move(head).error();
     predictor->heads_.push_back(std::move(*head));
+    progress();
   }
   return predictor;
 }

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "camera/image.h"
+#include "core/progress.h"
 #include "core/result.h"
 #include "features/gradient_histograms.h"
 #include "scene_coordinates/head.h"
@@ -31,7 +32,9 @@ class SceneCoordinatePredictor {
  public:
   /// The heads run in the precision that is the faster one when it is tried.
   /// @param threads  of features and matrix products, >= 1.
-  static Result<std::unique_ptr<SceneCoordinatePredictor>> Create(const SceneMap& map, int threads);
+  /// @param progress  called after each region's head.
+  static Result<std::unique_ptr<SceneCoordinatePredictor>> Create(
+      const SceneMap& map, int threads, const Progress& progress = Unwatched);
 
   [[nodiscard]] Precision precision() const { return precision_; }
 

@@ -38,7 +38,8 @@ struct ProcessConfig {
         "ready at once");
     visit("start_timeout_s",
           self.start_timeout_s,
-          "in [0.1, 3600]; for its first sign of life, and how long others wait for it");
+          "in [0.1, 3600]; for its first sign of life, or of progress at a large map; others wait "
+          "for it so long");
     visit("stop_timeout_s",
           self.stop_timeout_s,
           "in [0.1, 10]; from SIGTERM to SIGKILL; all tiers together: 10 at most");

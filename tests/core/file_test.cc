@@ -31,6 +31,13 @@ TEST_F(FileTest, ReadsBackWhatWasWritten) {
   EXPECT_EQ(ReadFile(folder_ + "/state").value(), "new");
 }
 
+TEST_F(FileTest, ReadsInSteps) {
+  ASSERT_TRUE(WriteFile(folder_ + "/state", std::string(200'000, 'x')));
+  int steps = 0;
+  EXPECT_EQ(ReadFile(folder_ + "/state", [&steps] { ++steps; })->size(), 200'000U);
+  EXPECT_EQ(steps, 4);
+}
+
 TEST_F(FileTest, LeavesNothingBesideTheFile) {
   ASSERT_TRUE(WriteFileAtomically(folder_ + "/state", "x"));
   const auto files = std::filesystem::directory_iterator(folder_);

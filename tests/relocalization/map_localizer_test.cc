@@ -190,6 +190,14 @@ TEST(MapLocalizerTest, APoseWhereItIsExpectedNeedsLessSupport) {
   }
 }
 
+TEST(MapLocalizerTest, MakesProgressWithEachRegion) {
+  SceneMap map = MakeMap();
+  map.regions.resize(3, map.regions.front());
+  int steps = 0;
+  ASSERT_TRUE(MapLocalizer::Create(map, {}, [&steps] { ++steps; }));
+  EXPECT_EQ(steps, 3);
+}
+
 TEST(MapLocalizerTest, SaysWhichMapIsMissing) {
   const auto none = MapLocalizer::Load({});
   ASSERT_FALSE(none);

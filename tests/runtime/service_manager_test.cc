@@ -1,48 +1,20 @@
 #include "runtime/service_manager.h"
 
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
-#include <cstddef>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "runtime/notify_listener.h"
+
 namespace relocd {
 namespace {
 
 using namespace std::chrono_literals;
-
-/// A manager's side: an abstract datagram socket with a name that the kernel chose.
-class Listener {
- public:
-  Listener() : fd_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    auto* generic = reinterpret_cast<sockaddr*>(&address);
-    EXPECT_EQ(::bind(fd_.get(), generic, sizeof(sa_family_t)), 0);
-    socklen_t size = sizeof(address);
-    EXPECT_EQ(::getsockname(fd_.get(), generic, &size), 0);
-    variable_ = "NOTIFY_SOCKET=@" +
-                std::string(&address.sun_path[1], size - offsetof(sockaddr_un, sun_path) - 1);
-  }
-
-  [[nodiscard]] const char* variable() const { return variable_.c_str(); }
-
-  std::string Receive() {
-    std::array<char, 4096> buffer{};
-    const ssize_t size = ::recv(fd_.get(), buffer.data(), buffer.size(), 0);
-    return size < 0 ? "nothing" : std::string(buffer.data(), static_cast<std::size_t>(size));
-  }
-
- private:
-  UniqueFd fd_;
-  std::string variable_;
-};
 
 TEST(ServiceManagerTest, DoesNothingWithoutASocket) {
   const std::array<const char*, 2> environment{"WATCHDOG_USEC=2000000", nullptr};
@@ -55,7 +27,7 @@ TEST(ServiceManagerTest, DoesNothingWithoutASocket) {
 }
 
 TEST(ServiceManagerTest, SaysEachStateInTheProtocolsWords) {
-  Listener listener;
+  NotifyListener listener;
   const std::array<const char*, 2> environment{listener.variable(), nullptr};
   ServiceManager manager = ServiceManager::FromEnvironment(environment.data());
   ASSERT_TRUE(manager.connected());
@@ -71,7 +43,7 @@ TEST(ServiceManagerTest, SaysEachStateInTheProtocolsWords) {
 }
 
 TEST(ServiceManagerTest, KeepsAStatusOnOneLine) {
-  Listener listener;
+  NotifyListener listener;
   const std::array<const char*, 2> environment{listener.variable(), nullptr};
   ServiceManager manager = ServiceManager::FromEnvironment(environment.data());
   manager.Status("camera lost\nREADY=1");
@@ -79,14 +51,14 @@ TEST(ServiceManagerTest, KeepsAStatusOnOneLine) {
 }
 
 TEST(ServiceManagerTest, AsksForAQuarterOfTheWatchdogsTime) {
-  Listener listener;
+  NotifyListener listener;
   const std::array<const char*, 3> environment{
       listener.variable(), "WATCHDOG_USEC=2000000", nullptr};
   EXPECT_EQ(ServiceManager::FromEnvironment(environment.data()).WatchdogPeriod(), 500ms);
 }
 
 TEST(ServiceManagerTest, IgnoresAWatchdogThatIsAnotherProcesss) {
-  Listener listener;
+  NotifyListener listener;
   const std::array<const char*, 4> others{
       listener.variable(), "WATCHDOG_USEC=2000000", "WATCHDOG_PID=1", nullptr};
   EXPECT_EQ(ServiceManager::FromEnvironment(others.data()).WatchdogPeriod(), std::nullopt);
@@ -111,7 +83,7 @@ TEST(ServiceManagerTest, IgnoresASocketThatCannotBe) {
 }
 
 TEST(ServiceManagerTest, DoesNotWaitForAManagerThatDoesNotReadAndSaysReadyLater) {
-  Listener listener;
+  NotifyListener listener;
   const std::array<const char*, 2> environment{listener.variable(), nullptr};
   ServiceManager manager = ServiceManager::FromEnvironment(environment.data());
   for (int i = 0; manager.delayed() == 0; ++i) {

@@ -61,6 +61,16 @@ TEST(MapFileTest, GivesBackWhatWasWritten) {
   EXPECT_EQ(SerializeMap(*read), SerializeMap(map));
 }
 
+TEST(MapFileTest, MakesProgressWithTheHashAndWithEachArray) {
+  const SceneMap map = MakeTestMap();
+  std::size_t arrays = 2;  // of the whitening
+  for (const MapRegion& region : map.regions)
+    arrays += 2 * region.head.layers.size();
+  std::size_t steps = 0;
+  ASSERT_TRUE(ParseMap(SerializeMap(map), "x.relocmap", [&steps] { ++steps; }));
+  EXPECT_EQ(steps, 1 + arrays);
+}
+
 TEST(MapFileTest, FilesGoThereAndBack) {
   const TemporaryFolder folder;
   const std::string path = folder.path() + "/a.relocmap";

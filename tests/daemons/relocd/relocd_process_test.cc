@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -16,6 +17,7 @@
 #include "core/file.h"
 #include "core/time.h"
 #include "core/unique_fd.h"
+#include "scene_coordinates/test_map.h"
 #include "supervision/child_process.h"
 #include "supervision/notify_server.h"
 #include "support/temporary_folder.h"
@@ -24,6 +26,7 @@ namespace relocd {
 namespace {
 
 using namespace std::chrono_literals;
+using testing::ContainsRegex;
 using testing::HasSubstr;
 
 /// The real relocd, with test children and without the daemons. What it logs goes to a file, what
@@ -201,6 +204,42 @@ TEST_F(RelocdProcessTest, RunsOnWhenNobodyReadsItsLog) {
     return Text("children.log") == "first start\nsecond start\nsecond term\nsecond start\n";
   });
   EXPECT_FALSE(relocd_->Reap());
+}
+
+TEST_F(RelocdProcessTest, WaitsForAMapThatComesSlowlyAndNotForOneThatDoesNotCome) {
+  const std::string path = directory_ + "site.relocmap";
+  ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+  ::signal(SIGPIPE, SIG_IGN);  // a reader that was aborted is a failed check, not this test's end
+  std::string text = "bus: {control_url: \"memq://\", image_url: \"memq://\"}\n";
+  text += fmt::format("inference: {{map_path: {}}}\nsupervisor:\n", path);
+  text += "  inferenced: {after: [], start_timeout_s: 1.5, watchdog_s: 1.5}\n";
+  for (const char* daemon : {"recorderd", "smootherd", "odometryd", "camerad"})
+    text += fmt::format("  {}: {{enabled: false, after: []}}\n", daemon);
+  WriteConfig(text);
+  StartRelocd();
+  UniqueFd map;
+  const auto is_read = [&] {
+    map = UniqueFd(::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC));
+    return map.valid();
+  };
+
+  WaitUntil(is_read);
+  WaitUntil([&] { return Text("relocd.log").find("aborting it") != std::string::npos; });
+  EXPECT_THAT(Text("relocd.log"), HasSubstr("inferenced: gave no sign of life for 1.5 s"));
+  map = UniqueFd();
+
+  WaitUntil(is_read);
+  const std::string bytes = SerializeMap(MakeTestMap());
+  constexpr std::size_t kPieces = 20;
+  const std::size_t piece = bytes.size() / kPieces + 1;
+  for (std::size_t at = 0; at < bytes.size(); at += piece) {
+    const std::string_view now = std::string_view(bytes).substr(at, piece);
+    ASSERT_EQ(::write(map.get(), now.data(), now.size()), static_cast<ssize_t>(now.size()));
+    ::poll(nullptr, 0, 100);
+  }
+  map = UniqueFd();
+  WaitUntil([&] { return HasStatus("1/1 ready"); });
+  EXPECT_THAT(Text("relocd.log"), ContainsRegex("inferenced: ready [2-9]\\.[0-9]+ s after"));
 }
 
 TEST_F(RelocdProcessTest, RefusesASecondCopy) {
