@@ -1,6 +1,5 @@
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <string>
@@ -12,6 +11,7 @@
 
 #include "config/config.h"
 #include "core/exit_code.h"
+#include "core/file.h"
 #include "log_csv.h"
 #include "log_summary.h"
 #include "messaging/in_process_bus.h"
@@ -22,6 +22,16 @@
 
 namespace relocd {
 namespace {
+
+/// Says what of the log was no whole message.
+void PrintDamage(const std::string& path, const LogReader::Counters& counters) {
+  if (counters.damaged_places == 0) return;
+  fmt::print(stderr,
+             "reloc log: {}: {} damaged places, {} bytes skipped\n",
+             path,
+             counters.damaged_places,
+             counters.skipped_bytes);
+}
 
 Result<int> Info(const std::string& path, bool json) {
   auto reader = LogReader::Open(path);
@@ -51,6 +61,7 @@ Result<int> LastStatus(const std::string& path, bool json) {
     if (auto ok = bus.PublishBytes(event->channel, event->data); !ok) return std::move(ok).error();
     bus.HandlePending();
   }
+  PrintDamage(path, reader->counters());
   fmt::print("{}", json ? report.Json(now) : report.Text(now));
   return kExitOk;
 }
@@ -76,20 +87,26 @@ Result<int> Export(const ExportOptions& options) {
   auto csv = LogCsv::ForChannel(options.channel, rows);
   if (!csv) return std::move(csv).error();
   std::string text = csv->header();
+  std::int64_t messages = 0;
   std::int64_t undecodable = 0;
   while (const auto event = reader->Next()) {
     if (event->channel != options.channel) continue;
+    ++messages;
     if (!csv->AppendRow(event->data, text)) ++undecodable;
   }
+  PrintDamage(options.log, reader->counters());
+  if (messages == 0) {
+    fmt::print(stderr, "reloc log: {}: has no message on {}\n", options.log, options.channel);
+  }
   if (undecodable > 0) {
-    fmt::print(
-        stderr, "{}: {} messages on {} do not decode\n", options.log, undecodable, options.channel);
+    fmt::print(stderr,
+               "reloc log: {}: {} of {} messages on {} do not decode\n",
+               options.log,
+               undecodable,
+               messages,
+               options.channel);
   }
-  std::ofstream out(options.out, std::ios::binary);
-  out << text;
-  if (!out.flush()) {
-    return Error{ErrorKind::kUnavailable, fmt::format("writing {}: failed", options.out)};
-  }
+  if (auto ok = WriteFileAtomically(options.out, text); !ok) return std::move(ok).error();
   return kExitOk;
 }
 

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kChunkSize = std::size_t{1} << 20;
 constexpr std::size_t kSyncSize = 4;
+using log_format::kSyncWord;
 
 }  // namespace
 
@@ -26,7 +27,17 @@ Result<LogReader> LogReader::Open(const std::string& path) {
   if (::read(fd.get(), nullptr, 0) != 0) {
     return SystemError(ErrorKind::kUnavailable, fmt::format("reading log {}", path));
   }
-  return LogReader(std::move(fd));
+  LogReader reader(std::move(fd));
+  const bool is_begun = !reader.Has(kSyncSize) || reader.BigEndianAt(0, kSyncSize) == kSyncWord;
+  reader.first_ = reader.FindEvent();
+  if (!reader.first_ && !is_begun) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("log {}: has no message in {} bytes, must be of lcm-logger or "
+                             "recorderd",
+                             path,
+                             reader.counters_.skipped_bytes)};
+  }
+  return reader;
 }
 
 bool LogReader::Has(std::size_t size) {
@@ -53,7 +64,6 @@ std::optional<LogEvent> LogReader::ReadEvent() {
   using log_format::kHeaderSize;
   using log_format::kMaxChannelSize;
   using log_format::kMaxDataSize;
-  using log_format::kSyncWord;
   if (!Has(kHeaderSize) || BigEndianAt(0, kSyncSize) != kSyncWord) return std::nullopt;
   const std::size_t channel_size = BigEndianAt(20, 4);
   const std::size_t data_size = BigEndianAt(24, 4);
@@ -78,12 +88,15 @@ std::optional<LogEvent> LogReader::ReadEvent() {
 }
 
 std::optional<LogEvent> LogReader::Next() {
+  auto event = first_ ? std::exchange(first_, std::nullopt) : FindEvent();
+  if (event) ++counters_.events;
+  return event;
+}
+
+std::optional<LogEvent> LogReader::FindEvent() {
   bool damaged = false;
   while (Has(1)) {
-    if (auto event = ReadEvent()) {
-      ++counters_.events;
-      return event;
-    }
+    if (auto event = ReadEvent()) return event;
     if (!std::exchange(damaged, true)) ++counters_.damaged_places;
     ++counters_.skipped_bytes;
     ++begin_;

@@ -15,7 +15,8 @@ namespace relocd {
 /// that is whole, where LCM's own reader stops for good.
 class LogReader {
  public:
-  /// @return kUnavailable when the file cannot be read.
+  /// @return kUnavailable when the file cannot be read; kInvalidInput when it has something in it,
+  ///         but no event, and does not begin as a log does.
   static Result<LogReader> Open(const std::string& path);
 
   /// The next whole event; nothing at the end.
@@ -31,6 +32,9 @@ class LogReader {
  private:
   explicit LogReader(UniqueFd fd) : fd_(std::move(fd)) {}
 
+  /// The next whole event of the file.
+  std::optional<LogEvent> FindEvent();
+
   /// The whole event that begins where we are, with another one or the end of the file behind it: a
   /// damaged length would otherwise swallow what follows.
   std::optional<LogEvent> ReadEvent();
@@ -40,8 +44,9 @@ class LogReader {
   [[nodiscard]] std::uint64_t BigEndianAt(std::size_t offset, std::size_t size) const;
 
   UniqueFd fd_;
-  std::string buffer_;     ///< A part of the file.
-  std::size_t begin_ = 0;  ///< Where we are, in the buffer.
+  std::string buffer_;             ///< A part of the file.
+  std::size_t begin_ = 0;          ///< Where we are, in the buffer.
+  std::optional<LogEvent> first_;  ///< Read to see that the file is a log.
   Counters counters_;
 };
 

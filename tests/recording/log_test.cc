@@ -121,6 +121,37 @@ TEST_F(LogTest, NamesALogThatIsNotThere) {
   EXPECT_THAT(reader.error().message, HasSubstr("/nonexistent/x.lcmlog"));
 }
 
+TEST_F(LogTest, RefusesAFileThatIsNoLog) {
+  ASSERT_TRUE(WriteFile(path_, "time_ns,x_m\n0,1\n"));
+  const auto reader = LogReader::Open(path_);
+  ASSERT_FALSE(reader);
+  EXPECT_EQ(reader.error().kind, ErrorKind::kInvalidInput);
+  EXPECT_EQ(reader.error().message,
+            "log " + path_ + ": has no message in 16 bytes, must be of lcm-logger or recorderd");
+}
+
+TEST_F(LogTest, ReadsNothingOfAnEmptyLogAndOfOneCutInItsFirstEvent) {
+  WriteEvents(1);
+  const std::string bytes = ReadFile(path_).value();
+  for (const std::size_t size : {std::size_t{0}, std::size_t{2}, std::size_t{30}}) {
+    ASSERT_TRUE(WriteFile(path_, bytes.substr(0, size)));
+    LogReader::Counters counters;
+    EXPECT_EQ(ReadAll(&counters).size(), 0U);
+    EXPECT_EQ(counters.events, 0);
+    EXPECT_EQ(counters.skipped_bytes, static_cast<std::int64_t>(size));
+  }
+}
+
+TEST_F(LogTest, ReadsALogWhoseBeginIsDamaged) {
+  WriteEvents(3);
+  const std::string bytes = ReadFile(path_).value();
+  ASSERT_TRUE(WriteFile(path_, bytes.substr(5)));
+  LogReader::Counters counters;
+  EXPECT_EQ(ReadAll(&counters).size(), 2U);
+  EXPECT_EQ(counters.events, 2);
+  EXPECT_EQ(counters.damaged_places, 1);
+}
+
 TEST_F(LogTest, AFolderIsNoEmptyLog) {
   const auto reader = LogReader::Open("/");
   ASSERT_FALSE(reader);

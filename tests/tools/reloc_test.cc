@@ -68,6 +68,22 @@ TEST(RelocTest, NamesTheNearestVerbOfAnUnknownOne) {
             "by: reloc help\n");
 }
 
+TEST(RelocTest, LogTellsAFileThatIsNoLogFromAnEmptyOne) {
+  const TemporaryFolder folder;
+  const std::string table = folder.Write("x.csv", "time_ns,x_m\n0,1\n");
+  for (const std::string& verb :
+       {"info " + table, "status " + table, "export --channel ODOMETRY --out /dev/null " + table}) {
+    const Outcome outcome = Reloc("log " + verb);
+    EXPECT_EQ(outcome.exit_code, 78);
+    EXPECT_THAT(outcome.output,
+                testing::StartsWith("reloc log: log " + table + ": has no message"));
+  }
+  const Outcome empty =
+      Reloc("log export --channel ODOMETRY --out /dev/null " + folder.Write("x.lcmlog", ""));
+  EXPECT_EQ(empty.exit_code, 0);
+  EXPECT_THAT(empty.output, HasSubstr("x.lcmlog: has no message on ODOMETRY\n"));
+}
+
 TEST(RelocTest, RunsNothingOutsideItsDirectory) {
   EXPECT_EQ(Reloc("/../../../bin/true").exit_code, 2);
   EXPECT_EQ(Reloc("''").exit_code, 2);
