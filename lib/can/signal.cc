@@ -1,10 +1,12 @@
 #include "can/signal.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <limits>
-#include <string_view>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -138,9 +140,15 @@ std::string FormatValue(const DbcSignal& signal, long double value) {
   const int decimals = std::max(Decimals(signal.factor), Decimals(signal.offset));
   // Above it the error of a factor such as 0.1, which no double holds, shows in the last decimal.
   const long double limit = decimals == 0 ? 0x1p64L : 4e15L;
-  const bool is_short = decimals < 18 && std::abs(value) * std::pow(10.0L, decimals) < limit;
-  if (signal.is_integer() && is_short) {
-    std::string text = fmt::format("{:.{}f}", value, decimals);
+  const long double scale = std::pow(10.0L, decimals);
+  if (signal.is_integer() && decimals < 18 && std::abs(value) * scale < limit) {
+    // Adding 0 turns -0 into 0.
+    const long double rounded = std::rint(value * scale) / scale + 0.0L;
+    std::array<char, 64> buffer{};  // not fmt, which has no such precision for small long doubles
+    const auto [end, error] = std::to_chars(
+        buffer.data(), buffer.data() + buffer.size(), rounded, std::chars_format::fixed, decimals);
+    RELOCD_CHECK(error == std::errc(), "a number of 20 digits fits");
+    std::string text(buffer.data(), end);
     if (decimals > 0) text.erase(text.find_last_not_of('0') + 1);
     if (text.ends_with('.')) text.pop_back();
     return text;
