@@ -5,11 +5,8 @@
 namespace relocd {
 
 bool IsCovariance(const Eigen::Ref<const Eigen::MatrixXd>& covariance) {
-  constexpr double kAsymmetry = 1e-6;
-  if (covariance.rows() != covariance.cols() || !covariance.allFinite()) return false;
-  if (!covariance.isApprox(covariance.transpose(), kAsymmetry)) return false;
-  const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
-  return factor.info() == Eigen::Success;
+  return covariance.rows() == covariance.cols() && IsSymmetricToRounding(covariance) &&
+         IsPositiveDefinite(Eigen::LLT<Eigen::MatrixXd>(covariance));
 }
 
 double SquaredMahalanobis(const Eigen::Ref<const Eigen::VectorXd>& error,

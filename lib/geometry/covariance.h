@@ -5,6 +5,21 @@
 
 namespace relocd {
 
+/// Whether a square matrix is finite and symmetric to rounding. Squares nothing: numbers of 1e308
+/// would hide all others.
+template <typename Matrix>
+bool IsSymmetricToRounding(const Matrix& matrix) {
+  constexpr double kAsymmetry = 1e-6;
+  return matrix.allFinite() && (matrix - matrix.transpose()).cwiseAbs().maxCoeff() <=
+                                   kAsymmetry * matrix.cwiseAbs().maxCoeff();
+}
+
+/// Whether a matrix that was factored so is positive definite. Eigen takes what overflows for it.
+template <typename Matrix>
+bool IsPositiveDefinite(const Eigen::LLT<Matrix>& factor) {
+  return factor.info() == Eigen::Success && factor.matrixLLT().allFinite();
+}
+
 /// Whether `covariance` (n x n) is finite, symmetric to rounding, and positive definite: what a
 /// message, a file or a measurement must satisfy before its inverse is taken.
 bool IsCovariance(const Eigen::Ref<const Eigen::MatrixXd>& covariance);
@@ -13,10 +28,7 @@ bool IsCovariance(const Eigen::Ref<const Eigen::MatrixXd>& covariance);
 template <int Size>
 requires(Size !=
          Eigen::Dynamic) bool IsCovariance(const Eigen::Matrix<double, Size, Size>& covariance) {
-  constexpr double kAsymmetry = 1e-6;
-  if (!covariance.allFinite()) return false;
-  if (!covariance.isApprox(covariance.transpose(), kAsymmetry)) return false;
-  return covariance.llt().info() == Eigen::Success;
+  return IsSymmetricToRounding(covariance) && IsPositiveDefinite(covariance.llt());
 }
 
 /// The squared Mahalanobis distance `error^T covariance^-1 error`. `covariance` must be positive

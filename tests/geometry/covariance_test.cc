@@ -21,6 +21,19 @@ TEST(CovarianceTest, RefusesWhatHasNoInverse) {
   EXPECT_FALSE(IsCovariance(Eigen::MatrixXd::Identity(2, 3)));
 }
 
+/// Finite numbers whose squares are not.
+TEST(CovarianceTest, RefusesWhatOverflows) {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  covariance(0, 2) = -1e308;
+  EXPECT_FALSE(IsCovariance(covariance)) << "not symmetric";
+  EXPECT_FALSE(IsCovariance(Eigen::MatrixXd(covariance))) << "not symmetric";
+  covariance(2, 0) = -1e308;
+  EXPECT_FALSE(IsCovariance(covariance)) << "not positive definite";
+  covariance(0, 0) = 0.01;
+  EXPECT_FALSE(IsCovariance(covariance)) << "not positive definite, and the root overflows";
+  EXPECT_FALSE(IsCovariance(Eigen::MatrixXd(covariance)));
+}
+
 TEST(CovarianceTest, MahalanobisDistanceWeighsByTheInverse) {
   Eigen::Matrix2d covariance;
   covariance << 4.0, 0.0, 0.0, 0.25;
