@@ -1,6 +1,5 @@
 #include <cstdio>
 #include <map>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,33 +38,6 @@ Result<SmootherConfig> ReadConfig(const Options& options) {
   return config->localization.smoother;
 }
 
-void ReportOdometry(const SystematicErrors& errors) {
-  if (OdometryPart(errors.prior_sigmas).isZero()) return;
-  const SystematicVector sigmas = errors.Sigmas();
-  fmt::print(stderr,
-             "odometry: misses {:.3f} +- {:.3f} % of the way, {:.3f} +- {:.3f} mrad of the turn on "
-             "each metre and {:.3f} +- {:.3f} mrad in each second\n",
-             100.0 * errors.odometry_scale(),
-             100.0 * sigmas[2],
-             1e3 * errors.odometry_rad_per_m(),
-             1e3 * sigmas[3],
-             1e3 * errors.odometry_rad_per_s(),
-             1e3 * sigmas[4]);
-}
-
-void ReportCamera(const SystematicErrors& errors) {
-  if (!errors.IsCameraSought()) return;
-  constexpr double kDegrees = 180.0 / std::numbers::pi;
-  const Eigen::Vector2d sigmas = CameraPart(errors.Sigmas());
-  fmt::print(stderr,
-             "camera: looks {:.3f} +- {:.3f} deg farther to the left than believed, its times are "
-             "{:.4f} +- {:.4f} s late\n",
-             kDegrees * errors.camera_yaw_rad(),
-             kDegrees * sigmas.x(),
-             errors.camera_time_s(),
-             sigmas.y());
-}
-
 void Report(const MotionLog& log, const std::vector<SmootherEstimate>& estimates) {
   std::map<std::string, int> rows;
   for (const SmootherEstimate& estimate : estimates)
@@ -85,8 +57,7 @@ Result<void> Run(const Options& options) {
   const std::vector<SmootherEstimate> estimates =
       options.smoothed ? SmoothAll(*log, *config, &errors) : SmoothCausally(*log, *config, &errors);
   Report(*log, estimates);
-  ReportOdometry(errors);
-  ReportCamera(errors);
+  fmt::print(stderr, "{}", Describe(errors));
   const std::string text = FormatEstimatesCsv(estimates);
   if (options.out.empty()) {
     fmt::print("{}", text);

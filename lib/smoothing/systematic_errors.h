@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include <Eigen/Core>
 
 #include "geometry/pose2.h"
@@ -97,6 +99,10 @@ struct SystematicErrors {
   [[nodiscard]] double odometry_rad_per_m() const { return estimate[3]; }
   [[nodiscard]] double odometry_rad_per_s() const { return estimate[4]; }
 };
+
+/// Those that are looked for, in words, a line each for the odometry and the camera; empty where
+/// none is.
+std::string Describe(const SystematicErrors& errors);
 
 /// A motion that is longer and turns more by a correction: half of the turn comes before the way,
 /// half after it.
