@@ -45,6 +45,9 @@ constexpr double kOdometryTimeout = 1.0;  // s
 /// angle.
 constexpr double kSetSigma = 2.0;         // m
 constexpr double kSetHeadingSigma = 0.2;  // rad
+/// No vehicle moves faster, nor farther in no time.
+constexpr double kFastest = 200.0;  // m/s
+constexpr double kJitter = 1.0;     // m
 /// In metres, rad and seconds: beyond it is no measurement of a vehicle on the Earth.
 constexpr double kLargestNumber = 1e8;
 constexpr double kUnknownYawVariance = std::numbers::pi * std::numbers::pi / 3.0;
@@ -171,6 +174,11 @@ OdometryStep SmootherNode::StepTo(const odometry_t& message) {
     step.covariance *= kGapFactor;
   }
   if (has_flag(odometry_t::FLAG_STALE)) step.covariance += Coast(time).covariance;
+  const double seconds = ToSeconds(time - FromNanoseconds(last_odometry_->mono_ns));
+  if (step.X_BprevB.translation().norm() > kJitter + kFastest * seconds) {
+    ++counters_.odometry_jumps;
+    return Coast(time);
+  }
   return step;
 }
 
@@ -196,6 +204,7 @@ void SmootherNode::Begin(const odometry_t& message) {
   first.time = FromNanoseconds(message.mono_ns);
   // The first step only sets the time, and cannot be refused.
   static_cast<void>(smoother_.AddOdometry(first).has_value());
+  step_since_published_ = Pose2();
   if (saved_) DecideRestore(message);
 }
 
@@ -290,12 +299,12 @@ void SmootherNode::ChangeMap(const std::string& map_id) {
   if (is_first) return;
   // Poses of another map are of another W.
   ++counters_.map_changes;
+  published_WB_.reset();
   StartAnew();
 }
 
 void SmootherNode::StartAnew() {
-  smoother_ = FixedLagSmoother(config_.smoother);
-  published_WB_.reset();
+  smoother_.Forget();
   if (!last_odometry_) return;
   OdometryStep first;
   first.time = FromNanoseconds(last_odometry_->mono_ns);
@@ -353,14 +362,15 @@ void SmootherNode::PublishLocalization(const odometry_t& message,
   answer.yaw_rate_radps = message.yaw_rate_radps;
   answer.time_since_fix_s = estimate.time_since_fix_s.value_or(-1.0);
   answer.distance_since_fix_m = estimate.distance_since_fix_m;
+  // Also while there is no pose: the next one may be elsewhere.
+  if (published_WB_) published_WB_ = *published_WB_ * step_since_published_;
   if (estimate.status != SmootherStatus::kUninitialised) {
     answer.x_WB_m = estimate.X_WB.x();
     answer.y_WB_m = estimate.X_WB.y();
     answer.yaw_WB_rad = estimate.X_WB.yaw();
     Eigen::Map<Eigen::Matrix3d>(answer.covariance) = estimate.covariance;  // symmetric
     if (published_WB_) {
-      const Pose2 expected = *published_WB_ * step_since_published_;
-      const Pose2 jump = expected.Inverse() * estimate.X_WB;
+      const Pose2 jump = published_WB_->Inverse() * estimate.X_WB;
       answer.jump_m = jump.translation().norm();
       answer.jump_rad = std::abs(jump.yaw());
     }
@@ -405,10 +415,9 @@ std::string SmootherNode::Explain(const SmootherEstimate& estimate) const {
   const Eigen::Vector3d sigmas = estimate.covariance.diagonal().cwiseSqrt();
   switch (estimate.status) {
     case SmootherStatus::kUninitialised:
-      return smoother_.counters().fixes_accepted == 0
-                 ? "no fix yet"
-                 : fmt::format("{} fixes do not agree on a pose yet",
-                               smoother_.counters().fixes_accepted);
+      return estimate.has_pose ? fmt::format("{} fixes do not agree on a pose yet",
+                                             smoother_.window().fixes.size())
+                               : "no fix yet";
     case SmootherStatus::kConverging:
       return fmt::format("sigma {:.2f} m, {:.2f} m, {:.3f} rad, or few fixes support the pose",
                          sigmas.x(),
@@ -454,6 +463,7 @@ void SmootherNode::AddFigures(const SmootherEstimate& estimate, NodeStatus& stat
   add("clock_jumps", counters_.clock_jumps);
   add("odometry_bridged", counters_.odometry_bridged);
   add("odometry_restarts", counters_.odometry_restarts);
+  add("odometry_jumps", counters_.odometry_jumps);
   add("camera_poses", counters_.camera_poses);
   add("camera_poses_without_pose", counters_.no_pose);
   add("camera_poses_of_unknown_camera", counters_.unknown_camera);

@@ -77,6 +77,7 @@ class SmootherNode {
     std::int64_t clock_jumps = 0;        ///< The odometry went on at an earlier time: began anew.
     std::int64_t odometry_bridged = 0;   ///< Messages before it were lost: X_OB tells the motion.
     std::int64_t odometry_restarts = 0;  ///< odometryd began anew: the motion is a guess.
+    std::int64_t odometry_jumps = 0;     ///< A motion that no vehicle can make: likewise.
     std::int64_t camera_poses = 0;
     std::int64_t no_pose = 0;         ///< The camera says that it does not know.
     std::int64_t unknown_camera = 0;  ///< A name that the config has not.
@@ -120,7 +121,7 @@ class SmootherNode {
   LatencyWindow pose_latency_ms_;
   LatencyWindow fix_latency_ms_;
   std::optional<odometry_t> last_odometry_;
-  std::optional<Pose2> published_WB_;  ///< X_WB of the last POSE.
+  std::optional<Pose2> published_WB_;  ///< X_WB of the last POSE, moved on by the odometry since.
   std::optional<Pose2> published_WO_;  ///< X_WO of the last MAP_TO_ODOM.
   Pose2 step_since_published_;
   std::int64_t next_seq_ = 0;

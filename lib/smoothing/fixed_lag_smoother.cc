@@ -80,6 +80,14 @@ bool IsUsable(const Fix& fix) {
          IsUsableCovariance(Eigen::Matrix2d(fix.covariance.topLeftCorner<2, 2>()));
 }
 
+/// A pose's covariance; where it is larger than any map, or by rounding none any more, that of
+/// nothing known.
+Eigen::Matrix3d AtMostUnknown(const Eigen::Matrix3d& covariance) {
+  const Eigen::Vector3d unknown = kUnknownSigmas.cwiseAbs2();
+  const bool is_known = (covariance.diagonal().array() <= unknown.array()).all();
+  return is_known && IsCovariance(covariance) ? covariance : Eigen::Matrix3d(unknown.asDiagonal());
+}
+
 double LargestPositionSigma(const Eigen::Matrix3d& covariance) {
   const Eigen::Matrix2d position = covariance.topLeftCorner<2, 2>();
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position).eigenvalues().y());
@@ -167,7 +175,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   chain_.Invalidate();
   voters_.clear();
   window_.last_removed_fix.reset();
-  agreements_since_start_ = 0;
+  NoteStart();
   window_.prior = KeyframePrior{.pose = prior};
   newest_covariance_ = prior.covariance;
   newest_by_errors_.setZero();
@@ -187,6 +195,14 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   newest_by_errors_.setZero();
   chain_.Invalidate();
   return {};
+}
+
+void FixedLagSmoother::Forget() {
+  LeaveHandler on_leave = std::move(on_leave_);
+  const SmootherCounters counters = counters_;
+  *this = FixedLagSmoother(config_);
+  on_leave_ = std::move(on_leave);
+  counters_ = counters;
 }
 
 Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
@@ -212,6 +228,7 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
                              step.X_BprevB.y(),
                              step.X_BprevB.yaw())};
   }
+  covariance = AtMostUnknown(covariance);
   const auto motion =
       MotionExtent::Of(step.X_BprevB, ToSeconds(step.time - history_.newest().time));
   const auto correction = MotionCorrection::Of(motion, OdometryPart(window_.systematic.estimate));
@@ -280,9 +297,11 @@ void FixedLagSmoother::MoveNewestCovariance(const Keyframe& next) {
   const Eigen::Matrix3d before = by_errors * errors * by_errors.transpose();
   by_errors.rightCols<3>() += Pose2(0.0, 0.0, -next.X_PK.yaw()).Adjoint() *
                               MotionByOdometryErrors(next.X_PK, next.extent_PK);
-  newest_covariance_ = ComposeCovariance(newest_covariance_, next.X_PK, next.covariance_PK) +
-                       by_errors * errors * by_errors.transpose() - before;
-  newest_by_errors_ = by_errors;
+  const Eigen::Matrix3d moved =
+      ComposeCovariance(newest_covariance_, next.X_PK, next.covariance_PK) +
+      by_errors * errors * by_errors.transpose() - before;
+  newest_covariance_ = AtMostUnknown(moved);
+  newest_by_errors_ = newest_covariance_ == moved ? by_errors : BySystematic(BySystematic::Zero());
 }
 
 void FixedLagSmoother::RemoveOldest() {
@@ -303,47 +322,50 @@ void FixedLagSmoother::RemoveOldest() {
 }
 
 void FixedLagSmoother::ReattachProvisional() {
+  const std::int64_t newest_id = window_.keyframes.back().id;
   int remaining = provisional_fixes_;
   for (std::size_t i = window_.fixes.size(); remaining > 0 && i-- > 0;) {
     AttachedFix& fix = window_.fixes[i];
     if (!fix.is_provisional) continue;
     --remaining;
-    if (fix.fix.time > history_.newest().time) continue;
+    // One that is still ahead goes to the newest keyframe: keyframes are in the order of the times.
+    if (fix.fix.time > history_.newest().time && fix.keyframe_id == newest_id) continue;
+    const std::int64_t id = fix.keyframe_id;
+    const auto count = [&](int change) {
+      Keyframe& keyframe = window_.Get(fix.keyframe_id);
+      (fix.is_gated ? keyframe.gated_fixes : keyframe.fixes) += change;
+    };
     const auto sample = history_.At(fix.fix.time);
-    if (!sample || !window_.Has(sample->keyframe_id)) continue;
-    std::optional<AttachedFix> attached = Attach(fix.fix, *sample);
-    if (!attached) continue;
-    attached->is_gated = fix.is_gated;
-    --(fix.is_gated ? window_.Get(fix.keyframe_id).gated_fixes
-                    : window_.Get(fix.keyframe_id).fixes);
-    ++(fix.is_gated ? window_.Get(attached->keyframe_id).gated_fixes
-                    : window_.Get(attached->keyframe_id).fixes);
-    const std::int64_t id = std::min(fix.keyframe_id, attached->keyframe_id);
-    fix = *attached;
+    if (sample) {
+      count(-1);
+      static_cast<void>(Attach(*sample, fix));
+      count(1);
+      NoteFixesChanged(id);
+    } else {
+      fix.is_provisional = false;
+    }
     if (!fix.is_provisional) --provisional_fixes_;
-    NoteFixesChanged(id);
   }
 }
 
-std::optional<AttachedFix> FixedLagSmoother::Attach(const Fix& fix,
-                                                    const OdometrySample& sample) const {
-  AttachedFix attached;
-  attached.fix = fix;
-  attached.keyframe_id = sample.keyframe_id;
-  attached.X_KB = sample.X_KB;
-  attached.covariance_KB = sample.covariance_KB;
-  attached.is_provisional = sample.is_extrapolated;
+bool FixedLagSmoother::Attach(const OdometrySample& sample, AttachedFix& fix) const {
+  fix.keyframe_id = sample.keyframe_id;
+  fix.X_KB = sample.X_KB;
+  fix.covariance_KB = sample.covariance_KB;
+  fix.is_provisional = sample.is_extrapolated;
+  bool is_complete = true;
   if (window_.systematic.IsCameraSought()) {
     const auto velocity = history_.VelocityAt(sample.time);
-    if (!velocity) return std::nullopt;
-    attached.is_provisional = history_.newest().time < sample.time + PoseHistory::kVelocityReach;
+    is_complete = velocity.has_value();
+    fix.is_provisional = history_.newest().time < sample.time + PoseHistory::kVelocityReach;
     // A camera that looks to the left has the body turned about the camera, and a late time has it
     // where it is no more.
-    if (fix.has_heading) attached.X_BF_by_camera.col(0) << fix.p_BC.y(), -fix.p_BC.x(), 1.0;
-    attached.X_BF_by_camera.col(1) = -*velocity;
+    const Eigen::Vector2d& p_BC = fix.fix.p_BC;
+    if (fix.fix.has_heading) fix.X_BF_by_camera.col(0) << p_BC.y(), -p_BC.x(), 1.0;
+    if (velocity) fix.X_BF_by_camera.col(1) = -*velocity;
   }
-  PrepareResidual(attached, CameraPart(window_.systematic.estimate));
-  return attached;
+  PrepareResidual(fix, CameraPart(window_.systematic.estimate));
+  return is_complete;
 }
 
 void FixedLagSmoother::Insert(AttachedFix fix) {
@@ -404,41 +426,45 @@ FixOutcome FixedLagSmoother::AddFix(const Fix& fix) {
     ++(is_ahead ? counters_.fixes_ahead : counters_.fixes_late);
     return is_ahead ? FixOutcome::kAhead : FixOutcome::kLate;
   }
-  std::optional<AttachedFix> attached;
-  if (window_.Has(sample->keyframe_id)) attached = Attach(fix, *sample);
-  if (!attached) {
+  AttachedFix attached;
+  attached.fix = fix;
+  if (!window_.Has(sample->keyframe_id) || !Attach(*sample, attached)) {
     ++counters_.fixes_late;
     return FixOutcome::kLate;
   }
-  const bool is_voter = Remember(*attached);
+  const bool is_voter = Remember(attached);
   if (!is_started_) {
     if (!unstarted_fix_ || fix.time > unstarted_fix_->time) unstarted_fix_ = fix;
     if (window_.Get(sample->keyframe_id).fixes < config_.max_fixes_per_keyframe) {
-      Insert(*std::move(attached));
+      Insert(std::move(attached));
     }
     ++counters_.fixes_accepted;
+    ++fixes_since_start_;
     NoteSupport(*sample);
     TryStart();
     return FixOutcome::kAccepted;
   }
 
-  const double squared_innovation = SquaredInnovation(*attached);
-  attached->is_gated = squared_innovation > config_.gate_squared_mahalanobis;
+  const double squared_innovation = SquaredInnovation(attached);
+  attached.is_gated = squared_innovation > config_.gate_squared_mahalanobis;
   if (is_voter && squared_innovation <= kAgreement) ++agreements_since_start_;
   const Keyframe& keyframe = window_.Get(sample->keyframe_id);
-  const bool is_full = (attached->is_gated ? keyframe.gated_fixes : keyframe.fixes) >=
-                       config_.max_fixes_per_keyframe;
-  const FixOutcome outcome = attached->is_gated ? FixOutcome::kGated
-                             : is_full          ? FixOutcome::kRedundant
-                                                : FixOutcome::kAccepted;
+  // A new start makes fixes that were gated count: together they may be twice as many, and no more.
+  const int most = config_.max_fixes_per_keyframe;
+  const bool is_full = (attached.is_gated ? keyframe.gated_fixes : keyframe.fixes) >= most ||
+                       keyframe.gated_fixes + keyframe.fixes >= 2 * most;
+  const FixOutcome outcome = attached.is_gated ? FixOutcome::kGated
+                             : is_full         ? FixOutcome::kRedundant
+                                               : FixOutcome::kAccepted;
   if (outcome != FixOutcome::kGated) NoteSupport(*sample);
   if (outcome == FixOutcome::kAccepted) {
     ++counters_.fixes_accepted;
-    Insert(*std::move(attached));
+    ++fixes_since_start_;
+    Insert(std::move(attached));
     SolveWindow(config_.max_iterations);
   } else if (outcome == FixOutcome::kGated) {
     ++counters_.fixes_gated;
-    if (!is_full) Insert(*std::move(attached));
+    if (!is_full) Insert(std::move(attached));
   } else {
     ++counters_.fixes_redundant;
   }
@@ -500,7 +526,7 @@ void FixedLagSmoother::TryStart() {
   }
   if (!consensus) return;
   is_started_ = true;
-  agreements_since_start_ = 0;
+  NoteStart();
   Reseed(consensus->X_WO);
 }
 
@@ -530,7 +556,6 @@ void FixedLagSmoother::Reseed(const Pose2& X_WO) {
   window_.last_removed_fix.reset();
   UpdateAllShares(window_, config_.fix_correlation_time_s);
   chain_.Invalidate();
-  fixes_until_misfit_ = 0;
   SolveWindow(kStartIterations);
 }
 
@@ -553,7 +578,7 @@ bool FixedLagSmoother::TryMend() {
   const auto found = FindOdometryBreak(window_, SupportOptions());
   if (!found) return false;
   ++counters_.relocalizations;
-  agreements_since_start_ = 0;
+  NoteStart();
   MendOdometryBreak(*found, window_);
   UpdateAllShares(window_, config_.fix_correlation_time_s);
   chain_.Invalidate();
@@ -575,7 +600,7 @@ bool FixedLagSmoother::TryRelocalize() {
   const auto consensus = FindConsensus(fixes, SupportOptions());
   if (!consensus || consensus->supporters < needed) return false;
   ++counters_.relocalizations;
-  agreements_since_start_ = 0;
+  NoteStart();
   Relocalize(consensus->X_WO, fixes);
   return true;
 }
@@ -632,7 +657,7 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
   bool is_solved = chain_.Solve(window_, weighting_, max_iterations);
   if (is_solved && --fixes_until_systematic_ <= 0) {
     fixes_until_systematic_ =
-        static_cast<int>(std::min(counters_.fixes_accepted, kSystematicMemory) / kSystematicParts);
+        static_cast<int>(std::min(fixes_since_start_, kSystematicMemory) / kSystematicParts);
     is_solved = chain_.EstimateSystematicErrors(window_, weighting_);
   }
   if (is_solved) {
@@ -644,12 +669,20 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
   RestartAtNewest();
 }
 
+void FixedLagSmoother::NoteStart() {
+  fixes_since_start_ = 0;
+  agreements_since_start_ = 0;
+  fixes_until_misfit_ = 0;
+  fixes_until_systematic_ = 0;
+}
+
 void FixedLagSmoother::RestartAtNewest() {
+  NoteStart();
   Keyframe newest = window_.keyframes.back();
   constexpr double kDoubt = 4.0;
   newest_covariance_ *= kDoubt;
   newest_covariance_.diagonal() += kLeastSigmas.cwiseAbs2();
-  if (!IsCovariance(newest_covariance_)) newest_covariance_ = Eigen::Matrix3d::Identity();
+  newest_covariance_ = AtMostUnknown(newest_covariance_);
   newest_by_errors_.setZero();
   window_.keyframes.clear();
   window_.fixes.clear();
@@ -693,6 +726,7 @@ std::optional<SmootherEstimate> FixedLagSmoother::EstimateAt(MonotonicTime time)
   estimate.X_WB = window_.Get(sample->keyframe_id).X_WK() * sample->X_KB;
   estimate.covariance = ComposeCovariance(newest_covariance_, sample->X_KB, sample->covariance_KB);
   estimate.covariance.diagonal() += kLeastSigmas.cwiseAbs2();
+  estimate.covariance = AtMostUnknown(estimate.covariance);
   estimate.status = Status(estimate.covariance, time);
   return estimate;
 }

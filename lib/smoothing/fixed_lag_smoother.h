@@ -109,6 +109,9 @@ class FixedLagSmoother {
   /// @return kInvalidInput when it is not finite or its covariance is none.
   Result<void> Reset(const PlanarPose& prior);
 
+  /// Forgets everything but what it has counted, odometry too.
+  void Forget();
+
   /// The first step only says where the odometry begins: its motion is not used.
   ///
   /// @return kInvalidInput when the time does not increase or a number is not usable; the step is
@@ -139,9 +142,11 @@ class FixedLagSmoother {
   void RemoveOldest();
   void ReattachProvisional();
 
-  /// @return nothing where the camera's time is sought and the odometry knows no velocity.
-  [[nodiscard]] std::optional<AttachedFix> Attach(const Fix& fix,
-                                                  const OdometrySample& sample) const;
+  /// Puts a fix where the body was.
+  ///
+  /// @return whether what the camera's errors make of it is known: not where they are sought and
+  /// the odometry knows no velocity.
+  bool Attach(const OdometrySample& sample, AttachedFix& fix) const;
   void Insert(AttachedFix fix);
   void NoteFixesChanged(std::int64_t keyframe_id);
   /// By so many times the fixes' sigmas are to be taken for larger than they say.
@@ -164,6 +169,9 @@ class FixedLagSmoother {
   void TakeFixErrors(const FixErrors& errors);
   void SolveWindow(int max_iterations);
   void RestartAtNewest();
+  /// The pose is another one now, and what is learned from fixes is soon to be learned from new
+  /// ones.
+  void NoteStart();
 
   [[nodiscard]] Pose2 X_WO() const;
   [[nodiscard]] Pose2 X_OF(const AttachedFix& fix) const;
@@ -205,7 +213,8 @@ class FixedLagSmoother {
   MotionCorrection correction_;       ///< Put into the odometry since then.
   double odometer_at_fix_m_ = 0.0;
   std::optional<MonotonicTime> last_support_;
-  std::int64_t agreements_since_start_ = 0;  ///< Fixes that lay where they were predicted.
+  std::int64_t fixes_since_start_ = 0;       ///< That were accepted since the pose began anew.
+  std::int64_t agreements_since_start_ = 0;  ///< Those that lay where they were predicted.
 };
 
 }  // namespace relocd

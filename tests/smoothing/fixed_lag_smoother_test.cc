@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <iostream>
 #include <limits>
 #include <numbers>
@@ -213,6 +214,34 @@ TEST(FixedLagSmootherTest, AFixAheadOfTheOdometryIsPutInItsPlaceWhenTheOdometryC
   EXPECT_LT(PositionError(ahead.Estimate().X_WB, on_time.Estimate().X_WB), 0.1);
 }
 
+/// The later fix comes first, and a keyframe between the two; then the oldest keyframes leave.
+TEST(FixedLagSmootherTest, FixesThatAreAheadStayInTheOrderOfTheKeyframes) {
+  SmootherConfig config;
+  config.window_keyframes = 2;
+  FixedLagSmoother smoother(config);
+  OdometryStep step;
+  step.X_BprevB = Pose2(1.0, 0.0, 0.0);
+  step.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+  Fix fix;
+  const auto drive = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      step.time += milliseconds(100);
+      ASSERT_TRUE(smoother.AddOdometry(step));
+    }
+  };
+  drive(3);
+  fix.time = step.time + milliseconds(350);
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kAccepted);
+  drive(1);
+  fix.time = step.time + milliseconds(150);
+  EXPECT_EQ(smoother.AddFix(fix), FixOutcome::kAccepted);
+  drive(1);
+  for (const AttachedFix& attached : smoother.window().fixes)
+    EXPECT_TRUE(smoother.window().Has(attached.keyframe_id));
+  drive(5);
+  EXPECT_EQ(smoother.window().fixes.size(), 0U);
+}
+
 TEST(FixedLagSmootherTest, CrossesPiWithoutNoticing) {
   for (const double yaw : {std::numbers::pi, -std::numbers::pi, 0.5 * std::numbers::pi}) {
     const auto drive = DriveSimulator({.X_WB0 = Pose2(0.0, 0.0, yaw)}, 7).Run();
@@ -305,6 +334,26 @@ TEST(FixedLagSmootherTest, StandingStillCostsNothing) {
   EXPECT_GT(smoother.counters().fixes_redundant, 35000);
   EXPECT_EQ(smoother.Estimate().status, SmootherStatus::kOk);
   EXPECT_LT(PositionError(smoother.Estimate().X_WB, drive.X_WB_end), 0.6);
+}
+
+/// A robot that stands where the images look like two places, now like the one, now like the other.
+TEST(FixedLagSmootherTest, StandingBetweenTwoPlacesTakesNoMoreAndMoreMemory) {
+  const auto drive = DriveSimulator({}, 9).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  Drive(drive, smoother);
+  const std::size_t fixes = smoother.window().fixes.size();
+  DriveSimulator simulator({}, 10);
+  OdometryStep step = drive.log.odometry.back();
+  step.X_BprevB = Pose2();
+  step.covariance = 1e-10 * Eigen::Matrix3d::Identity();
+  for (int i = 0; i < 3600; ++i) {
+    step.time += milliseconds(500);
+    ASSERT_TRUE(smoother.AddOdometry(step));
+    const double away_m = i / 60 % 2 == 0 ? 30.0 : 0.0;
+    smoother.AddFix(simulator.MakeFix(step.time, drive.X_WB_end * Pose2(away_m, 0.0, 0.0)));
+  }
+  EXPECT_GT(smoother.counters().relocalizations, 20);
+  EXPECT_LE(smoother.window().fixes.size(), fixes + 32);
 }
 
 TEST(FixedLagSmootherTest, RefusesWhatIsNotFinite) {
@@ -714,6 +763,45 @@ TEST(FixedLagSmootherTest, AResetIsAboutThisMoment) {
   OdometryStep step = drive.log.odometry.back();
   step.time += milliseconds(50);
   EXPECT_TRUE(smoother.AddOdometry(step));
+}
+
+/// As at first, though it has learned much and seen many fixes before.
+TEST(FixedLagSmootherTest, ForgetsEverythingButItsCounts) {
+  const auto drive = DriveSimulator({.duration_s = 400.0, .fix_rate_hz = 5.0}, 3).Run();
+  FixedLagSmoother fresh{SmootherConfig()};
+  FixedLagSmoother smoother{SmootherConfig()};
+  Drive(drive, smoother);
+  const std::int64_t accepted = smoother.counters().fixes_accepted;
+  smoother.Forget();
+  const auto next = DriveSimulator({.duration_s = 30.0, .fix_rate_hz = 5.0}, 4).Run();
+  const SmootherEstimate expected = Drive(next, fresh);
+  const SmootherEstimate estimate = Drive(next, smoother);
+  EXPECT_EQ(estimate.X_WB.translation(), expected.X_WB.translation());
+  EXPECT_EQ(estimate.covariance, expected.covariance);
+  EXPECT_EQ(estimate.status, expected.status);
+  EXPECT_EQ(smoother.counters().fixes_accepted, accepted + fresh.counters().fixes_accepted);
+}
+
+/// Who sets the pose may have put other wheels on: they are learned as fast as at first.
+TEST(FixedLagSmootherTest, LearnsTheOdometrysErrorsQuicklyAfterAReset) {
+  const auto drive = DriveSimulator({.duration_s = 400.0, .fix_rate_hz = 5.0}, 3).Run();
+  FixedLagSmoother smoother{SmootherConfig()};
+  Pose2 X_WB = Drive(drive, smoother).X_WB;
+  ASSERT_TRUE(smoother.Reset({.X_WB = X_WB, .covariance = 0.01 * Eigen::Matrix3d::Identity()}));
+  DriveSimulator simulator({}, 4);
+  OdometryStep step = drive.log.odometry.back();
+  step.X_BprevB = Pose2(0.3, 0.0, 0.0);
+  double before = smoother.systematic_errors().odometry_scale();
+  int changes = 0;
+  for (int i = 0; i < 20; ++i) {
+    step.time += milliseconds(200);
+    ASSERT_TRUE(smoother.AddOdometry(step));
+    X_WB = X_WB * step.X_BprevB;
+    smoother.AddFix(simulator.MakeFix(step.time, X_WB));
+    changes += smoother.systematic_errors().odometry_scale() != before ? 1 : 0;
+    before = smoother.systematic_errors().odometry_scale();
+  }
+  EXPECT_GT(changes, 15);
 }
 
 TEST(SmoothAllTest, FindsTheCamerasOffset) {

@@ -477,6 +477,37 @@ TEST_F(SmootherNodeTest, AResetForgetsThePoseAndTheFixesFindItAgain) {
   EXPECT_EQ(localizations_.back().status, localization_t::OK);
 }
 
+/// Also one to which there was no pose in between.
+TEST_F(SmootherNodeTest, TheFirstPoseAfterAResetIsAJump) {
+  DriveFor(20.0);
+  node_->Reset();
+  DriveFor(5.0, false);
+  X_WB_ = X_WB_ * Pose2(60.0, 0.0, 0.0);
+  const std::size_t before = localizations_.size();
+  DriveFor(20.0);
+  double jumped_m = 0.0;
+  for (std::size_t i = before; i < localizations_.size(); ++i)
+    jumped_m += localizations_[i].jump_m;
+  EXPECT_EQ(localizations_.back().status, localization_t::OK);
+  EXPECT_GT(jumped_m, 59.0);
+}
+
+TEST_F(SmootherNodeTest, CountsStayWhenThePoseIsForgotten) {
+  DriveFor(20.0);
+  node_->SetPose(PoseMessage(X_WB_ * Pose2(100.0, 0.0, 1.0)));
+  DriveFor(30.0);
+  const localization_t before = localizations_.back();
+  EXPECT_EQ(before.resets, 2);  // set, and found again
+  const std::int64_t accepted = node_->smoother().counters().fixes_accepted;
+  EXPECT_GT(accepted, 60);
+  node_->Reset();
+  DriveFor(1.0, false);
+  EXPECT_EQ(localizations_.back().resets, 3);
+  EXPECT_EQ(localizations_.back().fixes_accepted, accepted);
+  EXPECT_EQ(localizations_.back().fixes_rejected, before.fixes_rejected);
+  EXPECT_THAT(localizations_.back().message, HasSubstr("no fix yet"));
+}
+
 TEST_F(SmootherNodeTest, OneMessageFromHoursAheadDoesNotSilenceTheOthersForGood) {
   DriveFor(20.0);
   odometry_t ahead = Drive();
