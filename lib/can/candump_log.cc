@@ -212,7 +212,7 @@ Result<std::optional<CandumpRecord>> CandumpLog::Next() {
     }
     return std::optional(std::move(record).value());
   }
-  if (stream_->bad()) return Error{ErrorKind::kUnavailable, fmt::format("reading {}", path_)};
+  if (stream_->bad()) return SystemError(ErrorKind::kUnavailable, fmt::format("reading {}", path_));
   return std::optional<CandumpRecord>();
 }
 

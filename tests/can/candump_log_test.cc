@@ -184,6 +184,12 @@ TEST(CandumpLogTest, IsNoLogWithNothingButALineThatIsNone) {
             "ELF', must be (SECONDS.MICROSECONDS)");
 }
 
+TEST(CandumpLogTest, SaysThatAFolderIsNoLog) {
+  auto log = CandumpLog::Open("/");
+  ASSERT_TRUE(log);
+  EXPECT_EQ(log->Next().error().message, "reading /: Is a directory");
+}
+
 TEST(CandumpLogTest, GivesTheDataFramesOfOneInterface) {
   CandumpLog log = CandumpLog::FromText(
       "(1.0) can1 123#01\n(1.1) can0 20000080#0000000000000000\n(1.2) can0 123#R\n"
