@@ -106,6 +106,9 @@ std::vector<ReferencePose> Select(const std::vector<ReferencePose>& references,
 Result<OdometryRecording> Record(const Options& options,
                                  const Config& config,
                                  const OdometryConfig& odometry) {
+  if (config.can.dbc_file.empty()) {
+    return Invalid(fmt::format("{}: can.dbc_file is empty, must name a DBC file", options.config));
+  }
   auto dbc = DbcFile::Read(config.can.dbc_file);
   if (!dbc) return std::move(dbc).error();
   auto recorder = OdometryRecorder::Create(odometry, *dbc, config.can.messages);
@@ -138,6 +141,12 @@ Result<void> CheckOptions(const Options& options) {
   }
   if (!(options.spacing_s > 0.0 && options.spacing_s <= 60.0)) {
     return Invalid(fmt::format("--spacing-s is {}, must be in (0, 60]", options.spacing_s));
+  }
+  if (!std::all_of(options.mount.begin(), options.mount.end(), [](double number) {
+        return std::abs(number) <= 360.0;
+      })) {
+    return Invalid(fmt::format("--mount is {}, must be three numbers in [-360, 360]",
+                               fmt::join(options.mount, " ")));
   }
   return {};
 }
@@ -237,6 +246,9 @@ Result<std::vector<SquareRun>> ReadRuns(const std::string& path) {
 }
 
 Result<void> RunUmbmark(const Options& options) {
+  if (!(options.side_m > 0.0 && options.side_m <= 1000.0)) {
+    return Invalid(fmt::format("--side-m is {}, must be in (0, 1000]", options.side_m));
+  }
   if (options.runs.empty()) {
     fmt::print(fmt::runtime(kUmbmarkGuide), options.side_m);
     return {};

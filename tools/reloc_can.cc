@@ -337,6 +337,7 @@ int main(int argc, char** argv) {
   decode.add_option("--dbc", options.dbc, "the DBC file; without it the config's can.dbc_file");
   decode.add_option("--config", options.config, "YAML file with can.messages: counters, checksums");
   decode.add_option("--set", options.overrides, "section.key=value, put over the config's")
+      ->needs("--config")
       ->allow_extra_args(false);
   decode.add_option("--can", options.can, "what candump -L wrote")->required();
   decode.add_option("--interface", options.interface, "only its frames, such as can0");

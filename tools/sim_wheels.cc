@@ -76,7 +76,23 @@ Result<void> WriteDrive(const Options& options, const SimulatedDrive& drive) {
   return WriteFileAtomically(options.truth, truth);
 }
 
+Result<void> CheckOptions(const Options& options) {
+  if (!(std::abs(options.camera_forward_m) <= 100.0)) {
+    return Error{
+        ErrorKind::kInvalidInput,
+        fmt::format("--camera-forward-m is {}, must be in [-100, 100]", options.camera_forward_m)};
+  }
+  if (!(options.begin_s < options.end_s)) {
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("--begin-s is {} and --end-s {}, must be a time and a later one",
+                             options.begin_s,
+                             options.end_s)};
+  }
+  return {};
+}
+
 Result<void> SimulateDrive(Options options) {
+  if (auto ok = CheckOptions(options); !ok) return ok;
   auto config = LoadConfig(options.config, {});
   if (!config) return std::move(config).error();
   if (config->can.dbc_file.empty()) {

@@ -40,6 +40,15 @@ Result<Umbmark> EvaluateUmbmark(const std::vector<SquareRun>& runs, double side_
     return Error{ErrorKind::kInvalidInput,
                  fmt::format("side is {} m and track {} m, must be positive", side_m, track_m)};
   }
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i].error_m.norm() < side_m) continue;
+    return Error{ErrorKind::kInvalidInput,
+                 fmt::format("run {} ends {} m from where odometry has it, must be below the "
+                             "side of {} m",
+                             i + 1,
+                             runs[i].error_m.norm(),
+                             side_m)};
+  }
   const Cluster cw = ClusterOf(runs, true);
   const Cluster ccw = ClusterOf(runs, false);
   if (cw.size == 0 || ccw.size == 0) {

@@ -92,6 +92,16 @@ TEST(UmbmarkTest, TellsItsSpread) {
   EXPECT_NEAR(std::sqrt(squared / kSeeds), 1.1, 0.25);  // ten runs: Student's t
 }
 
+TEST(UmbmarkTest, RefusesARunThatEndsFurtherOffThanASideIsLong) {
+  const auto found = EvaluateUmbmark(
+      {{.clockwise = true, .error_m = {0.1, 0.0}}, {.clockwise = false, .error_m = {3.0, 4.0}}},
+      4.0,
+      0.5);
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().message,
+            "run 2 ends 5 m from where odometry has it, must be below the side of 4 m");
+}
+
 TEST(UmbmarkTest, NeedsBothDirections) {
   const auto found = EvaluateUmbmark({{.clockwise = true}}, kSideM, kTrackM);
   ASSERT_FALSE(found);

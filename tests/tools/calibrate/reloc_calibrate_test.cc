@@ -54,6 +54,18 @@ class RelocCalibrateTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
+TEST_F(RelocCalibrateTest, NamesAnOptionThatIsOutOfRange) {
+  EXPECT_THAT(Run("umbmark --side-m nan").output,
+              HasSubstr("--side-m is nan, must be in (0, 1000]"));
+  const std::string drive =
+      fmt::format("odometry --config {}ackermann_demo.yaml --can x --reference y ", kVehicles);
+  EXPECT_THAT(Run(drive + "--mount nan 0 0").output,
+              HasSubstr("--mount is nan 0 0, must be three numbers in [-360, 360]"));
+  const Ended empty = Run(drive + "--set can.dbc_file=");
+  EXPECT_EQ(empty.exit_code, 78);
+  EXPECT_THAT(empty.output, HasSubstr("can.dbc_file is empty, must name a DBC file"));
+}
+
 TEST_F(RelocCalibrateTest, FindsTheScaleOfMotionsAndDrawsThem) {
   WriteDrive();
   const Ended ended = Run(fmt::format(

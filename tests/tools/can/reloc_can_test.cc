@@ -119,6 +119,7 @@ TEST_F(RelocCanTest, SaysThatTheLastLineIsCutOff) {
 }
 
 TEST_F(RelocCanTest, SaysWhatIsMissing) {
+  EXPECT_EQ(Run("--set can.interface=can1 --dbc " + dbc_).exit_code, 2);
   EXPECT_THAT(Run("").output, HasSubstr("no DBC file, must be given by --dbc or --config"));
   const Ended unknown = Run("--dbc " + dbc_ + " --message WHEEL");
   EXPECT_EQ(unknown.exit_code, 78);

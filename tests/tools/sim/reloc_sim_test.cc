@@ -178,6 +178,19 @@ TEST_F(RelocSimTest, SaysWhatIsWrong) {
   EXPECT_EQ(RunTool("--out " + out_ + " --vehicle /nowhere.yaml").exit_code, 1);
 }
 
+TEST_F(RelocSimTest, WheelsSayWhatIsWrong) {
+  const std::vector<Refusal> refusals{
+      {"--camera-forward-m nan", 78, "--camera-forward-m is nan, must be in [-100, 100]"},
+      {"--begin-s nan", 78, "--begin-s is nan and --end-s inf, must be a time and a later one"},
+      {"--begin-s 2 --end-s 1", 78, "--begin-s is 2 and --end-s 1, must be a time and a later"}};
+  for (const Refusal& refusal : refusals) {
+    const Ended ended = RunTool("wheels --config " + kVehicles + "ackermann_demo.yaml --out " +
+                                out_ + " --trajectory x.csv " + refusal.arguments);
+    EXPECT_EQ(ended.exit_code, refusal.exit_code) << refusal.arguments;
+    EXPECT_THAT(ended.output, HasSubstr(refusal.says));
+  }
+}
+
 TEST_F(RelocSimTest, WritesOverNothing) {
   std::filesystem::create_directories(out_);
   const Ended ended = RunTool(DriveArguments());
