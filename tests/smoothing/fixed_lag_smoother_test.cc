@@ -729,6 +729,16 @@ TEST(FixedLagSmootherTest, SaysHowFarItKnowsItsPose) {
   EXPECT_GT(later.covariance(1, 1), at_end.covariance(1, 1));
 }
 
+double LargestErrorWhileOk(const std::vector<SmootherEstimate>& estimates,
+                           const SimulatedDrive& drive) {
+  double largest_m = 0.0;
+  for (std::size_t i = 0; i < estimates.size(); ++i) {
+    if (estimates[i].status != SmootherStatus::kOk) continue;
+    largest_m = std::max(largest_m, PositionError(estimates[i].X_WB, drive.truth_at_fixes[i]));
+  }
+  return largest_m;
+}
+
 /// The first fixes are off together: the pose begins there, and does not say that it is sure of it.
 TEST(FixedLagSmootherTest, IsNotOkBeforeItsPredictionsHoldAfterAPoorStart) {
   for (unsigned seed = 0; seed < kSeeds; ++seed) {
@@ -737,13 +747,8 @@ TEST(FixedLagSmootherTest, IsNotOkBeforeItsPredictionsHoldAfterAPoorStart) {
       for (std::size_t i = 0; i < poor; ++i)
         drive.log.fixes[i].X_WB = Pose2(1.5, 1.2, 0.0) * drive.log.fixes[i].X_WB;
       const auto estimates = SmoothCausally(drive.log, SmootherConfig());
-      double worst_ok_m = 0.0;
-      for (std::size_t i = 0; i < estimates.size(); ++i) {
-        if (estimates[i].status != SmootherStatus::kOk) continue;
-        worst_ok_m =
-            std::max(worst_ok_m, PositionError(estimates[i].X_WB, drive.truth_at_fixes[i]));
-      }
-      EXPECT_LT(worst_ok_m, 0.8) << seed << ": " << poor << " poor fixes";
+      EXPECT_LT(LargestErrorWhileOk(estimates, drive), 0.8)
+          << seed << ": " << poor << " poor fixes";
       EXPECT_EQ(estimates.back().status, SmootherStatus::kOk);
       EXPECT_LT(PositionError(estimates[30].X_WB, drive.truth_at_fixes[30]), 0.5) << seed;
     }

@@ -30,6 +30,12 @@ constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr std::int64_t kHourNs = 3600 * kSecondNs;
 constexpr double kPeriodS = 0.05;
 
+template <typename Numbers>
+auto& Draw(Numbers& numbers, TestRandom& random) {
+  return numbers.at(
+      static_cast<std::size_t>(random.Integer(0, static_cast<int>(numbers.size()) - 1)));
+}
+
 double HostileNumber(TestRandom& random) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr std::array kNumbers{std::numeric_limits<double>::quiet_NaN(),
@@ -46,7 +52,7 @@ double HostileNumber(TestRandom& random) {
                                 1e-11,
                                 0.0,
                                 -1.0};
-  return kNumbers.at(static_cast<std::size_t>(random.Integer(0, kNumbers.size() - 1)));
+  return Draw(kNumbers, random);
 }
 
 std::int64_t HostileTime(TestRandom& random, std::int64_t now_ns) {
@@ -57,7 +63,7 @@ std::int64_t HostileTime(TestRandom& random, std::int64_t now_ns) {
                          now_ns - kHourNs,
                          now_ns + kSecondNs / 2,
                          now_ns - 2 * kSecondNs};
-  return times.at(static_cast<std::size_t>(random.Integer(0, times.size() - 1)));
+  return Draw(times, random);
 }
 
 /// The node's options in one of many ways.
@@ -65,7 +71,8 @@ LocalizationConfig DrawConfig(TestRandom& random) {
   const auto sometimes = [&random] { return random.Integer(0, 3) == 0; };
   LocalizationConfig config;
   SmootherConfig& smoother = config.smoother;
-  smoother.window_keyframes = std::array{2, 10, 40, 40, 450}.at(random.Integer(0, 4));
+  constexpr std::array kWindows{2, 10, 40, 40, 450};
+  smoother.window_keyframes = Draw(kWindows, random);
   if (sometimes()) smoother.camera_yaw_sigma_rad = 0.05;
   if (sometimes()) smoother.camera_time_sigma_s = 0.1;
   if (sometimes()) smoother.odometry_yaw_rate_sigma_rad_per_s = 0.01;
@@ -189,7 +196,7 @@ class FaultyDrive {
                                          &message.yaw_rate_radps,
                                          &message.motion_covariance[random_.Integer(0, 8)],
                                          &message.y_OB_m};
-    if (Happens(5.0)) *numbers.at(random_.Integer(0, 7)) = HostileNumber(random_);
+    if (Happens(5.0)) *Draw(numbers, random_) = HostileNumber(random_);
     if (Happens(30.0)) message.mono_ns = HostileTime(random_, time_ns_);
     if (Happens(30.0)) message.prev_mono_ns = HostileTime(random_, time_ns_);
   }
@@ -281,8 +288,9 @@ class FaultyDrive {
                   fixes.fixes_invalid);
     const auto& window = node_.smoother().window();
     const auto keyframes = static_cast<std::size_t>(config_.smoother.window_keyframes);
+    const auto most = static_cast<std::size_t>(config_.smoother.max_fixes_per_keyframe);
     ASSERT_LE(window.keyframes.size(), keyframes);
-    ASSERT_LE(window.fixes.size(), 3 * keyframes * config_.smoother.max_fixes_per_keyframe);
+    ASSERT_LE(window.fixes.size(), 3 * most * keyframes);
     if (const auto state = node_.State("boot")) {
       const auto read = ParseSavedState(FormatSavedState(*state), "state");
       ASSERT_TRUE(read) << read.error().message;
