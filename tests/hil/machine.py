@@ -1,6 +1,7 @@
 """What the cases share: the guest's devices, programs, and the passing of time."""
 
 import json
+import os
 import pathlib
 import socket
 import struct
@@ -158,6 +159,12 @@ def child(name):
     """The pid of a daemon of the service; 0 without one."""
     found = subprocess.run(["pgrep", "-x", "-P", service("MainPID"), name], stdout=subprocess.PIPE, text=True)
     return int(found.stdout.split()[0]) if found.stdout else 0
+
+
+def cpu_s(pid):
+    """The time on the CPU that a process has had."""
+    fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Wheels(threading.Thread):

@@ -6,7 +6,7 @@ import pathlib
 import shutil
 import time
 
-from machine import check, drive, install, make_can, output_of, run, service, start, wait_until
+from machine import check, child, cpu_s, drive, install, make_can, output_of, run, service, start, statuses, wait_until
 
 CONFIG = pathlib.Path("/etc/relocd/robot.yaml")
 MAP = pathlib.Path("/var/lib/relocd/maps/site.relocmap")
@@ -52,18 +52,25 @@ def _play(pixel_format):
     check(True, "all daemons are ready, before the drive begins" if time.monotonic_ns() < epoch_ns else "all daemons are ready")
     check(player.wait(timeout=60) == 0, "the drive was played")
     check(service("NRestarts") == "0", "relocd was not restarted")
+    on_cpu_s = {name: round(cpu_s(child(name)), 1) for name in ("camerad", "inferenced", "odometryd", "recorderd", "smootherd")}
+    print("seconds on the CPU:", on_cpu_s, flush=True)
+    time.sleep(1.5)  # until all that came is in a status
+    told = statuses()["inferenced"]["values"]
     run("systemctl", "stop", "relocd")
     (log,) = logs()[-1:]
     print(output_of("reloc", "log", "info", log), flush=True)
     channels = json.loads(output_of("reloc", "log", "info", log, "--json"))["channels"]
     check(channels["ODOMETRY"]["events"] >= 3000, f"{channels['ODOMETRY']['events']} ODOMETRY of 3045")
     check(channels["IMAGE_front"]["events"] >= 235, f"{channels['IMAGE_front']['events']} images of 244")
+    accounted = told["images"] + told["IMAGE_front_superseded"]
+    check(accounted == channels["IMAGE_front"]["events"],
+          f"each image was worked on or counted: {told['images']:.0f} seen, {told['images_too_old']:.0f} of them too old, {told['IMAGE_front_superseded']:.0f} superseded")
     fused, camera = errors("LOCALIZATION", epoch_ns, log), errors("CAMERA_POSE", epoch_ns, log)
     print("camera", camera["position_m"], "fused", fused["position_m"], fused["rotation_deg"], flush=True)
     check(fused["position_m"]["mean"] < 1.0, f"mean error of the pose is {fused['position_m']['mean']:.2f} m")
     with open("/tmp/LOCALIZATION.csv") as table:
-        statuses = [row["status"] for row in csv.DictReader(table)]
-    check("ok" in statuses and "fault" not in statuses, f"its status is ok in {statuses.count('ok')} of {len(statuses)} messages, fault in none")
+        said = [row["status"] for row in csv.DictReader(table)]
+    check("ok" in said and "fault" not in said, f"its status is ok in {said.count('ok')} of {len(said)} messages, fault in none")
 
 
 def mjpeg():
