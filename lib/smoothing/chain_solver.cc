@@ -27,6 +27,9 @@ constexpr double kSettledLength = 1e-4;
 constexpr double kSettledTurn = 1e-5;
 /// A step that turns a keyframe by more is looked at: has it lowered the cost?
 constexpr double kDoubtfulTurn = 0.1;
+/// Systematic errors whose estimates change by a smaller part of what is not known of them are left
+/// as they are: to put all motions and poses right costs what many fixes do.
+constexpr double kLeastSystematicChange = 0.03;
 /// A keyframe that leaves takes this part of what is known of the systematic errors with it: a
 /// camera that was knocked is seen within some thousand keyframes.
 constexpr double kForgotten = 5e-4;
@@ -91,6 +94,7 @@ void ChainSolver::Invalidate() {
   systematic_.clear();
   first_dirty_ = 0;
   first_systematic_dirty_ = 0;
+  next_systematic_ = 0;
 }
 
 void ChainSolver::FixesChanged(std::int64_t first_id, std::int64_t last_id) {
@@ -109,6 +113,7 @@ void ChainSolver::Synchronize(const KeyframeWindow& window, const FixWeighting& 
     systematic_.pop_front();
     if (first_dirty_ > 0) --first_dirty_;
     if (first_systematic_dirty_ > 0) --first_systematic_dirty_;
+    if (next_systematic_ > 0) --next_systematic_;
   }
   for (std::size_t i = nodes_.size(); i < window.keyframes.size(); ++i) {
     const Keyframe& keyframe = window.keyframes[i];
@@ -478,28 +483,39 @@ bool ChainSolver::Solve(KeyframeWindow& window, const FixWeighting& weighting, i
   return true;
 }
 
-bool ChainSolver::EstimateSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting) {
+bool ChainSolver::EstimateSystematicErrors(KeyframeWindow& window,
+                                           const FixWeighting& weighting,
+                                           std::size_t keyframes) {
+  if (!window.systematic.IsSought()) return true;
+  const std::size_t end = std::min(next_systematic_ + keyframes, nodes_.size());
+  for (; next_systematic_ < end; ++next_systematic_) {
+    const std::size_t i = next_systematic_;
+    CorrectSystematic(window, weighting, i == 0 ? FromPrior(window) : Predict(i), i);
+  }
+  if (next_systematic_ < nodes_.size()) return true;
+  next_systematic_ = 0;
+  return !TakeSystematicErrors(window, weighting) || Solve(window, weighting, 1);
+}
+
+bool ChainSolver::TakeSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting) {
   SystematicErrors& systematic = window.systematic;
-  if (!systematic.IsSought()) return true;
-  Synchronize(window, weighting);
-  Linearize(window, weighting);
-  first_dirty_ = 0;
-  first_systematic_dirty_ = 0;
-  Eliminate(window, weighting, 0.0, nodes_.size());
   const SystematicKnowledge& known = systematic_.back().state.known;
   const SystematicMatrix posterior =
       SystematicPosterior(systematic.prior_sigmas, known.information);
   systematic.covariance = SystematicCovariance(posterior, known, weighting);
   const SystematicVector before = systematic.estimate;
-  window.SetSystematicErrors(posterior * (known.rhs + known.information * before));
+  const SystematicVector estimate = posterior * (known.rhs + known.information * before);
+  const SystematicVector least = kLeastSystematicChange * systematic.Sigmas();
+  if (((estimate - before).array().abs() <= least.array()).all()) return false;
+  window.SetSystematicErrors(estimate);
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     SystematicKnowledge& there = systematic_[i].state.known;
-    there.rhs -= there.information * (systematic.estimate - before);
+    there.rhs -= there.information * (estimate - before);
     nodes_[i].are_fixes_new = nodes_[i].are_fixes_new || systematic.IsCameraSought();
     if (i > 0) TakeMotion(window.keyframes[i], i);
   }
   first_dirty_ = 0;
-  return Solve(window, weighting, 1);
+  return true;
 }
 
 Eigen::Matrix3d ChainSolver::NewestCovariance(const KeyframeWindow& window,

@@ -48,11 +48,14 @@ class ChainSolver {
   /// @return whether the estimates are finite; if not, they are as before.
   bool Solve(KeyframeWindow& window, const FixWeighting& weighting, int max_iterations);
 
-  /// Estimates the systematic errors from all that the window knows, and moves its estimates with
-  /// them. Looks at each keyframe, as Solve does not.
+  /// Looks at up to so many keyframes more, from the oldest on, for what they say of the systematic
+  /// errors. Come to the newest, estimates the errors from all that the window knows, moves the
+  /// poses with them where that is worth it, and begins at the oldest again.
   ///
-  /// @return as Solve.
-  bool EstimateSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting);
+  /// To be called after Solve. @return as Solve.
+  bool EstimateSystematicErrors(KeyframeWindow& window,
+                                const FixWeighting& weighting,
+                                std::size_t keyframes);
 
   /// The covariance of the newest keyframe's right perturbation given all in the window, as of the
   /// last Solve: the last block of the elimination, and what the fixes' bias and the
@@ -207,6 +210,8 @@ class ChainSolver {
                          const FixWeighting& weighting,
                          const Prediction& predicted,
                          std::size_t i);
+  /// @return whether they differ from the estimate by enough to move the poses with them.
+  bool TakeSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting);
   static void ForgetSystematic(const SystematicState& next, KeyframeWindow& window);
   void WriteEstimates(KeyframeWindow& window) const;
 
@@ -221,7 +226,8 @@ class ChainSolver {
   std::size_t first_dirty_ = 0;               ///< From here on the elimination is to be done again.
   /// From here on fixes are new to what is known of the systematic errors.
   std::size_t first_systematic_dirty_ = 0;
-  double misfit_ = 0.0;  ///< Of the elimination.
+  std::size_t next_systematic_ = 0;  ///< That EstimateSystematicErrors looks at.
+  double misfit_ = 0.0;              ///< Of the elimination.
 };
 
 }  // namespace relocd

@@ -47,7 +47,8 @@ constexpr std::size_t kUsualFixesPerKeyframe = 4;
 constexpr int kMisfitParts = 30;
 constexpr double kMisfitChange = 0.05;
 /// The systematic errors are estimated anew when so many parts of the fixes are new: of all fixes,
-/// as far back as is not nearly forgotten. It costs several times what a fix does otherwise.
+/// as far back as is not nearly forgotten. Until then each fix has a share of the keyframes looked
+/// at.
 constexpr std::int64_t kSystematicParts = 50;
 constexpr std::int64_t kSystematicMemory = 10000;
 /// Motion of a keyframe's first instant: its covariance must be positive definite.
@@ -655,11 +656,8 @@ void FixedLagSmoother::SolveWindow(int max_iterations) {
     TakeFixErrors(misfit_.Measure(window_, weighting_));
   }
   bool is_solved = chain_.Solve(window_, weighting_, max_iterations);
-  if (is_solved && --fixes_until_systematic_ <= 0) {
-    fixes_until_systematic_ =
-        static_cast<int>(std::min(fixes_since_start_, kSystematicMemory) / kSystematicParts);
-    is_solved = chain_.EstimateSystematicErrors(window_, weighting_);
-  }
+  is_solved = is_solved &&
+              chain_.EstimateSystematicErrors(window_, weighting_, KeyframesForSystematicErrors());
   if (is_solved) {
     newest_covariance_ = chain_.NewestCovariance(window_, weighting_);
     newest_by_errors_ = chain_.NewestBySystematicErrors();
@@ -673,7 +671,11 @@ void FixedLagSmoother::NoteStart() {
   fixes_since_start_ = 0;
   agreements_since_start_ = 0;
   fixes_until_misfit_ = 0;
-  fixes_until_systematic_ = 0;
+}
+
+std::size_t FixedLagSmoother::KeyframesForSystematicErrors() const {
+  const std::int64_t fixes = std::min(fixes_since_start_, kSystematicMemory) / kSystematicParts;
+  return window_.keyframes.size() / static_cast<std::size_t>(std::max(fixes, std::int64_t{1})) + 1;
 }
 
 void FixedLagSmoother::RestartAtNewest() {

@@ -168,6 +168,8 @@ class FixedLagSmoother {
   void CutBefore(std::int64_t keyframe_id);
   void TakeFixErrors(const FixErrors& errors);
   void SolveWindow(int max_iterations);
+  /// So many are to be looked at with one fix, for the systematic errors.
+  [[nodiscard]] std::size_t KeyframesForSystematicErrors() const;
   void RestartAtNewest();
   /// The pose is another one now, and what is learned from fixes is soon to be learned from new
   /// ones.
@@ -198,7 +200,6 @@ class FixedLagSmoother {
   ChainSolver chain_;
   FixMisfit misfit_;
   int fixes_until_misfit_ = 0;
-  int fixes_until_systematic_ = 0;
   int provisional_fixes_ = 0;  ///< In the window.
   bool is_started_ = false;
   Eigen::Matrix3d newest_covariance_ = Eigen::Matrix3d::Zero();  ///< Of the newest keyframe.

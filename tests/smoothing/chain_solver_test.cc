@@ -256,7 +256,7 @@ void SolveToTheEnd(KeyframeWindow& window, const FixWeighting& weighting, ChainS
   for (int i = 0; i < 20; ++i) {
     chain.Invalidate();
     ASSERT_TRUE(chain.Solve(window, weighting, 10));
-    ASSERT_TRUE(chain.EstimateSystematicErrors(window, weighting));
+    ASSERT_TRUE(chain.EstimateSystematicErrors(window, weighting, window.keyframes.size()));
   }
 }
 
@@ -278,6 +278,25 @@ TEST(ChainSolverTest, FindsTheSystematicErrorsThatCeresFinds) {
           << i;
     EXPECT_LT(LargestDifference(window, optimum), 0.02);
   }
+}
+
+TEST(ChainSolverTest, TheSystematicErrorsMayBeLookedForInSteps) {
+  KeyframeWindow window = MakeWindowOfSystematicErrors(60, 7);
+  KeyframeWindow in_steps = window;
+  ChainSolver chain(60);
+  ChainSolver stepping(60);
+  ASSERT_TRUE(chain.Solve(window, kBiased, 10));
+  ASSERT_TRUE(stepping.Solve(in_steps, kBiased, 10));
+  ASSERT_TRUE(chain.EstimateSystematicErrors(window, kBiased, 60));
+  constexpr int kSteps = 9;  // the last one with the rest, of four
+  for (int i = 0; i < kSteps; ++i) {
+    EXPECT_EQ(in_steps.systematic.estimate, SystematicVector::Zero()) << "after step " << i;
+    ASSERT_TRUE(stepping.EstimateSystematicErrors(in_steps, kBiased, 7));
+  }
+  EXPECT_NE(window.systematic.estimate, SystematicVector::Zero());
+  EXPECT_EQ(in_steps.systematic.estimate, window.systematic.estimate);
+  EXPECT_EQ(in_steps.systematic.covariance, window.systematic.covariance);
+  EXPECT_EQ(in_steps.keyframes.back().x_WK, window.keyframes.back().x_WK);
 }
 
 TEST(ChainSolverTest, TheSystematicErrorsCovarianceIsThatOfTheWholeNormalEquations) {
