@@ -148,11 +148,9 @@ class WindowProblem {
   WindowProblem(KeyframeWindow& window, const FixWeighting& weighting)
       : cauchy_(weighting.KernelScale()), problem_(ProblemOptions()) {
     Keyframe& oldest = window.keyframes.front();
-    const PlanarPose prior =
-        window.prior ? window.prior->pose
-                     : PlanarPose{.X_WB = oldest.X_WK(),
-                                  .covariance = kUnknownSigmas.cwiseAbs2().asDiagonal()};
-    AddFix(AbsolutePoseResidual::OfPose(prior.X_WB, Pose2(), prior.covariance), nullptr, oldest);
+    const KeyframePrior prior = window.prior.value_or(KeyframePrior::At(
+        {.X_WB = oldest.X_WK(), .covariance = kUnknownSigmas.cwiseAbs2().asDiagonal()}));
+    AddFix(AbsolutePoseResidual::OfPose(prior.X_WK(), Pose2(), prior.covariance), nullptr, oldest);
     SystematicErrors& systematic = window.systematic;
     double* const camera_errors = systematic.estimate.data();
     double* const odometry_errors = systematic.estimate.data() + 2;

@@ -9,7 +9,6 @@
 #include <Eigen/LU>
 
 #include "core/check.h"
-#include "geometry/angle.h"
 
 namespace relocd {
 namespace {
@@ -222,11 +221,10 @@ ChainSolver::Prediction ChainSolver::FromPrior(const KeyframeWindow& window) con
   if (!window.prior) {
     return {Eigen::Vector3d::Zero(), kUnknownSigmas.cwiseAbs2().asDiagonal(), {}};
   }
-  const Pose2& X_WM = window.prior->pose.X_WB;
-  const Eigen::Vector3d& reference = nodes_.front().reference;
-  Eigen::Vector3d mean;
-  mean << X_WM.translation() - reference.head<2>(), WrapAngle(X_WM.yaw() - reference.z());
-  return {mean, AlongMap(window.prior->pose.covariance, X_WM.yaw()), window.prior->bias};
+  const KeyframePrior& prior = *window.prior;
+  return {prior.x_WK - nodes_.front().reference,
+          AlongMap(prior.covariance, prior.x_WK.z()),
+          prior.bias};
 }
 
 ChainSolver::Prediction ChainSolver::Predict(std::size_t i) {
@@ -494,7 +492,7 @@ bool ChainSolver::EstimateSystematicErrors(KeyframeWindow& window,
   }
   if (next_systematic_ < nodes_.size()) return true;
   next_systematic_ = 0;
-  return !TakeSystematicErrors(window, weighting) || Solve(window, weighting, 1);
+  return !TakeSystematicErrors(window, weighting) || Solve(window, weighting, 2);
 }
 
 bool ChainSolver::TakeSystematicErrors(KeyframeWindow& window, const FixWeighting& weighting) {
@@ -547,9 +545,9 @@ void ChainSolver::MarginalizeOldest(KeyframeWindow& window, const FixWeighting& 
   if (nodes_[1].is_motion_new) LinearizeMotion(1);
   if (std::min(first_dirty_, first_systematic_dirty_) == 0) Eliminate(window, weighting, 0.0, 1);
   const Prediction next = Predict(1);
-  const Eigen::Vector3d x_WM = nodes_[1].reference + next.mean;
-  window.prior = KeyframePrior{.pose = {.X_WB = Pose2(x_WM.x(), x_WM.y(), x_WM.z()),
-                                        .covariance = AlongMap(next.covariance, -x_WM.z())},
+  const Eigen::Vector3d x_WK = nodes_[1].reference + next.mean;
+  window.prior = KeyframePrior{.x_WK = x_WK,
+                               .covariance = AlongMap(next.covariance, -x_WK.z()),
                                .bias = next.bias,
                                .systematic = {}};
   if (window.systematic.IsSought()) ForgetSystematic(PredictSystematic(window, 1), window);

@@ -177,7 +177,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   voters_.clear();
   window_.last_removed_fix.reset();
   NoteStart();
-  window_.prior = KeyframePrior{.pose = prior};
+  window_.prior = KeyframePrior::At(prior);
   newest_covariance_ = prior.covariance;
   newest_by_errors_.setZero();
   if (window_.keyframes.empty()) return {};
@@ -190,7 +190,7 @@ Result<void> FixedLagSmoother::Reset(const PlanarPose& prior) {
   }
   while (window_.keyframes.size() > 1)
     RemoveOldest();
-  window_.prior = KeyframePrior{.pose = prior};
+  window_.prior = KeyframePrior::At(prior);
   window_.keyframes.front().SetX_WK(prior.X_WB);
   newest_covariance_ = prior.covariance;
   newest_by_errors_.setZero();
@@ -261,7 +261,7 @@ Result<void> FixedLagSmoother::AddOdometry(const OdometryStep& step) {
 void FixedLagSmoother::Begin(MonotonicTime time) {
   Keyframe keyframe;
   keyframe.time = time;
-  if (window_.prior) keyframe.SetX_WK(window_.prior->pose.X_WB);
+  if (window_.prior) keyframe.SetX_WK(window_.prior->X_WK());
   window_.keyframes.push_back(std::move(keyframe));
   OdometrySample sample;
   sample.time = time;
@@ -694,7 +694,7 @@ void FixedLagSmoother::RestartAtNewest() {
   chain_.Invalidate();
   newest.fixes = 0;
   newest.gated_fixes = 0;
-  window_.prior = KeyframePrior{.pose = {.X_WB = newest.X_WK(), .covariance = newest_covariance_}};
+  window_.prior = KeyframePrior{.x_WK = newest.x_WK, .covariance = newest_covariance_};
   window_.keyframes.push_back(std::move(newest));
 }
 

@@ -186,10 +186,7 @@ void KeyframeWindow::SetSystematicErrors(const SystematicVector& errors) {
   }
   for (Keyframe& keyframe : keyframes)
     keyframe.CorrectMotionBy(OdometryPart(errors));
-  if (!prior) return;
-  const Eigen::Vector3d moved = prior->systematic.by_errors * change;
-  const Pose2& X_WM = prior->pose.X_WB;
-  prior->pose.X_WB = Pose2(X_WM.x() + moved.x(), X_WM.y() + moved.y(), X_WM.yaw() + moved.z());
+  if (prior) prior->x_WK += prior->systematic.by_errors * change;
 }
 
 void KeyframeWindow::PopFront() {

@@ -136,9 +136,19 @@ class FixWeighting {
 
 /// What is known of a keyframe from those before it.
 struct KeyframePrior {
-  PlanarPose pose;
+  /// x, y and yaw, of the same turn as the keyframe's estimate: while little is known of the yaw, a
+  /// linear filter may have it half a turn away and more.
+  Eigen::Vector3d x_WK = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< Of its right perturbation.
   FixBiasEffect bias = {};  ///< Along W's axes, not part of the pose's covariance.
   SystematicEffect systematic = {};
+
+  /// That of a keyframe whose estimate is the pose.
+  static KeyframePrior At(const PlanarPose& pose) {
+    const Pose2& X_WK = pose.X_WB;
+    return {.x_WK = {X_WK.x(), X_WK.y(), X_WK.yaw()}, .covariance = pose.covariance};
+  }
+  [[nodiscard]] Pose2 X_WK() const { return {x_WK.x(), x_WK.y(), x_WK.z()}; }
 };
 
 /// A chain of keyframes with fixes on them, and what is known of its oldest from those before.

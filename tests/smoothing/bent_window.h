@@ -41,9 +41,8 @@ inline KeyframeWindow MakeBentWindow(int keyframes, unsigned seed) {
   };
   KeyframeWindow window;
   Pose2 X_WK(3.0, 4.0, 3.0);
-  window.prior =
-      KeyframePrior{.pose = {.X_WB = X_WK * error(0.3),
-                             .covariance = Eigen::Vector3d(0.2, 0.1, 0.01).asDiagonal()}};
+  window.prior = KeyframePrior::At(
+      {.X_WB = X_WK * error(0.3), .covariance = Eigen::Vector3d(0.2, 0.1, 0.01).asDiagonal()});
   for (int i = 0; i < keyframes; ++i) {
     const Pose2 X_PK = Pose2::Exp({0.5, 0.01, 0.1});
     if (i > 0) X_WK = X_WK * X_PK;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <iostream>
+#include <numbers>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -152,7 +153,7 @@ DenseEquations SetUpDense(KeyframeWindow& window) {
   const SystematicVector sigmas = window.systematic.prior_sigmas.cwiseMax(1e-9);
   dense.information.bottomRightCorner<5, 5>().diagonal() = sigmas.cwiseAbs2().cwiseInverse();
   const auto prior =
-      AbsolutePoseResidual::OfPose(window.prior->pose.X_WB, Pose2(), window.prior->pose.covariance);
+      AbsolutePoseResidual::OfPose(window.prior->X_WK(), Pose2(), window.prior->covariance);
   dense.information.topLeftCorner<3, 3>() += prior.information();
   for (Eigen::Index i = 3; i < size; i += 3) {
     const Keyframe& keyframe = window.keyframes[static_cast<std::size_t>(i / 3)];
@@ -268,13 +269,14 @@ TEST(ChainSolverTest, FindsTheSystematicErrorsThatCeresFinds) {
     SolveToTheEnd(window, weighting, chain);
     ASSERT_TRUE(SolveBatch(optimum, weighting, 200));
     // Ceres has the motions' derivatives at the start: a tenth of the way later they are others.
+    // And less than 0.03 sigma is no reason for the chain to move all poses.
     const SystematicVector sigmas = window.systematic.Sigmas();
     EXPECT_GT(optimum.systematic.camera_time_s(), 0.1);
     EXPECT_GT(optimum.systematic.odometry_scale(), 0.03);
     EXPECT_LT(sigmas[0], 0.1);
     EXPECT_LT(sigmas[2], 0.03);
     for (int i = 0; i < 5; ++i)
-      EXPECT_NEAR(window.systematic.estimate[i], optimum.systematic.estimate[i], 0.08 * sigmas[i])
+      EXPECT_NEAR(window.systematic.estimate[i], optimum.systematic.estimate[i], 0.11 * sigmas[i])
           << i;
     EXPECT_LT(LargestDifference(window, optimum), 0.02);
   }
@@ -363,6 +365,38 @@ TEST(ChainSolverTest, MarginalizingChangesNeitherEstimateNorCovariance) {
               IsNear(chain.NewestCovariance(whole, kBiased), 5e-5));
 }
 
+/// At first the filter hardly knows the yaw, and one fix to the side turns its mean by more than
+/// half a turn from the estimate, which all fixes make. So far away it must stay.
+TEST(ChainSolverTest, MarginalizingKeepsAYawThatIsFarFromTheEstimate) {
+  const auto make = [] {
+    KeyframeWindow window = MakeBentWindow(60, 2);
+    window.prior.reset();
+    for (AttachedFix& fix : window.fixes) {
+      fix.fix.has_heading = false;
+      if (fix.keyframe_id == 3) fix.fix.X_WB = Pose2(0.0, 5.0, 0.0) * fix.fix.X_WB;
+      PrepareResidual(fix);
+    }
+    UpdateAllShares(window, 0.0);
+    return window;
+  };
+  KeyframeWindow whole = make();
+  KeyframeWindow shortened = make();
+  ChainSolver chain(60);
+  ChainSolver other(60);
+  ASSERT_TRUE(chain.Solve(whole, kQuadratic, 50));
+  ASSERT_TRUE(other.Solve(shortened, kQuadratic, 50));
+  double farthest = 0.0;
+  for (int i = 0; i < 10; ++i) {
+    other.MarginalizeOldest(shortened, kQuadratic);
+    other.Invalidate();
+    ASSERT_TRUE(other.Solve(shortened, kQuadratic, 50));
+    farthest = std::max(farthest,
+                        std::abs(shortened.prior->x_WK.z() - shortened.keyframes.front().x_WK.z()));
+  }
+  EXPECT_GT(farthest, std::numbers::pi);
+  EXPECT_LT(LargestDifference(shortened, whole), 1e-3);
+}
+
 /// A stiff chain that is held by weak fixes alone: what a rigid shift costs is small beside what
 /// bending costs.
 KeyframeWindow MakeStiffWindow() {
@@ -392,8 +426,10 @@ TEST(ChainSolverTest, ComesDownFromFarAwayInShorterSteps) {
   KeyframeWindow window = MakeBentWindow(100, 4);
   KeyframeWindow turned = MakeBentWindow(100, 4);
   const Pose2 X_turned(5.0, 3.0, 1.5);
-  for (Keyframe& keyframe : turned.keyframes)
-    keyframe.SetX_WK(X_turned * keyframe.X_WK());
+  for (Keyframe& keyframe : turned.keyframes) {
+    const Pose2 X_WK = X_turned * keyframe.X_WK();
+    keyframe.x_WK << X_WK.translation(), keyframe.x_WK.z() + X_turned.yaw();
+  }
   ASSERT_TRUE(SolveBatch(window, kQuadratic, 100));
   ASSERT_TRUE(ChainSolver(100).Solve(turned, kQuadratic, 50));
   EXPECT_LT(LargestDifference(turned, window), 2e-3);

@@ -796,15 +796,15 @@ TEST(FixedLagSmootherTest, LearnsTheOdometrysErrorsQuicklyAfterAReset) {
   DriveSimulator simulator({}, 4);
   OdometryStep step = drive.log.odometry.back();
   step.X_BprevB = Pose2(0.3, 0.0, 0.0);
-  double before = smoother.systematic_errors().odometry_scale();
+  SystematicVector before = smoother.systematic_errors().Sigmas();
   int changes = 0;
   for (int i = 0; i < 20; ++i) {
     step.time += milliseconds(200);
     ASSERT_TRUE(smoother.AddOdometry(step));
     X_WB = X_WB * step.X_BprevB;
     smoother.AddFix(simulator.MakeFix(step.time, X_WB));
-    changes += smoother.systematic_errors().odometry_scale() != before ? 1 : 0;
-    before = smoother.systematic_errors().odometry_scale();
+    changes += smoother.systematic_errors().Sigmas() != before ? 1 : 0;
+    before = smoother.systematic_errors().Sigmas();
   }
   EXPECT_GT(changes, 15);
 }
