@@ -139,6 +139,10 @@ Result<SavedState> ParseSavedState(std::string_view text, const std::string& pat
   SavedState state;
   state.boot_id = reader.Text("boot_id");
   state.time = FromNanoseconds(reader.Int64("mono_ns"));
+  if (state.time < MonotonicTime()) {
+    reader.Fail(reader.LineOf("mono_ns"),
+                fmt::format("mono_ns is {}, must be >= 0", reader.Text("mono_ns")));
+  }
   state.odometry_run_id = reader.Int64("odometry_run_id");
   state.map_id = reader.Text("map_id");
   state.X_WB = ToPose(reader.Numbers("X_WB", kPoseNumbers));
