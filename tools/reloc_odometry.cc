@@ -95,7 +95,8 @@ void Print(const Summary& summary, const WheelOdometry& odometry, bool json) {
         "{{\"samples\": {}, \"increments\": {}, \"flagged\": {}, \"duration_s\": {:.6f}, "
         "\"distance_m\": {:.6f}, \"x_OB_m\": {:.6f}, \"y_OB_m\": {:.6f}, \"yaw_OB_rad\": {:.6f}, "
         "\"gaps\": {}, \"jumps\": {}, \"slips\": {}, \"out_of_order\": {}, \"bad_checksums\": {}, "
-        "\"stuck_counters\": {}, \"short_frames\": {}, \"missing_frames\": {}}}\n",
+        "\"stuck_counters\": {}, \"short_frames\": {}, \"missing_frames\": {}, "
+        "\"non_finite_values\": {}}}\n",
         counts.samples,
         summary.increments,
         summary.flagged,
@@ -111,7 +112,8 @@ void Print(const Summary& summary, const WheelOdometry& odometry, bool json) {
         frames.bad_checksums,
         frames.stuck_counters,
         frames.short_frames,
-        frames.missing_frames);
+        frames.missing_frames,
+        frames.non_finite);
     return;
   }
   fmt::print(
@@ -125,7 +127,7 @@ void Print(const Summary& summary, const WheelOdometry& odometry, bool json) {
       X_OB.yaw());
   fmt::print(
       "flagged {} of {}: gaps {}, slips {}; refused: jumps {}, out of order {}, bad checksums {}, "
-      "stuck counters {}, short frames {}; missing {}\n",
+      "stuck counters {}, short frames {}, values that are not finite {}; missing {}\n",
       summary.flagged,
       summary.increments,
       counts.gaps,
@@ -135,6 +137,7 @@ void Print(const Summary& summary, const WheelOdometry& odometry, bool json) {
       frames.bad_checksums,
       frames.stuck_counters,
       frames.short_frames,
+      frames.non_finite,
       frames.missing_frames);
 }
 

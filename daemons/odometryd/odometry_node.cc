@@ -187,6 +187,7 @@ NodeStatus OdometryNode::Status(const ClockReading& now) const {
   add("stuck_counters", frames.stuck_counters);
   add("short_frames", frames.short_frames);
   add("missing_frames", frames.missing_frames);
+  add("non_finite_values", frames.non_finite);
   add("can_received", bus_status_.received);
   add("can_dropped", bus_status_.dropped);
   add("can_error_frames", bus_status_.error_frames);

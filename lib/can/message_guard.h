@@ -73,6 +73,7 @@ class MessageGuard {
     std::int64_t stuck_counters = 0;  ///< Refused: the same count as the frame before.
     std::int64_t short_frames = 0;    ///< Refused: not as long as the DBC file says.
     std::int64_t missing_frames = 0;  ///< By the counter.
+    std::int64_t non_finite = 0;      ///< Refused: values that are not finite, of valid frames.
 
     Counters& operator+=(const Counters& more) {
       frames += more.frames;
@@ -80,10 +81,14 @@ class MessageGuard {
       stuck_counters += more.stuck_counters;
       short_frames += more.short_frames;
       missing_frames += more.missing_frames;
+      non_finite += more.non_finite;
       return *this;
     }
   };
   [[nodiscard]] const Counters& counters() const { return counters_; }
+
+  /// A value of a valid frame turned out to be NaN or infinite.
+  void CountNonFinite() { ++counters_.non_finite; }
 
  private:
   explicit MessageGuard(int size) : size_(size) {}

@@ -23,7 +23,10 @@ std::optional<double> SignalReader::Handle(const CanFrame& frame) {
   if (guard_.Judge(frame).verdict != FrameVerdict::kValid) return std::nullopt;
   if (!IsPresent(message_, signal_, frame.payload())) return std::nullopt;
   const auto value = DecodeSignal(signal_, frame.payload());
-  if (!value) return std::nullopt;
+  if (!value) {
+    guard_.CountNonFinite();
+    return std::nullopt;
+  }
   value_ = value;
   value_time_ = frame.receive_time;
   return value;

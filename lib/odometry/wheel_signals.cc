@@ -186,10 +186,13 @@ bool WheelSignals::Accept(const CanFrame& frame) {
   return false;
 }
 
-void WheelSignals::Store(const CanFrame& frame, Input& input) const {
+void WheelSignals::Store(const CanFrame& frame, Input& input) {
   if (!IsPresent(input.message, input.signal, frame.payload())) return;
   const auto value = DecodeSignal(input.signal, frame.payload());
-  if (!value) return;
+  if (!value) {
+    guards_.at(frame.id).CountNonFinite();
+    return;
+  }
   input.bits = DecodeBits(input.signal, frame.payload());
   input.value = *value * speed_unit_mps_;
   input.time = frame.receive_time;

@@ -111,7 +111,7 @@ class WheelSignals {
   Result<void> AddGuards(const WheelSignalsConfig& config, const DbcFile& dbc, const Rules& rules);
   /// Whether the frame may be used. Remembers why not.
   bool Accept(const CanFrame& frame);
-  void Store(const CanFrame& frame, Input& input) const;
+  void Store(const CanFrame& frame, Input& input);
   std::optional<WheelSample> TakeCompleteSet(MonotonicTime time);
 
   bool are_ticks_ = true;

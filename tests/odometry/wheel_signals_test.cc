@@ -101,6 +101,25 @@ TEST(WheelSignalsSetTest, WaitsForBothMessagesOfASet) {
   EXPECT_FALSE(signals.Handle(right));
 }
 
+TEST(WheelSignalsSetTest, CountsAndLeavesOutSpeedsThatAreNotFinite) {
+  const DbcFile dbc = Parse(
+      "BO_ 1 L: 8 X\n SG_ LEFT : 0|32@1- (1,0) [0|0] \"m/s\" X\n"
+      " SG_ RIGHT : 32|32@1- (1,0) [0|0] \"m/s\" X\n"
+      "SIG_VALTYPE_ 1 LEFT : 1;\nSIG_VALTYPE_ 1 RIGHT : 1;\n");
+  WheelSignalsConfig config{.kind = "speed", .left_signal = "L.LEFT", .right_signal = "L.RIGHT"};
+  WheelSignals signals = WheelSignals::Create(config, dbc).value();
+  CanFrame frame;
+  frame.id.value = 1;
+  frame.SetPayload(std::array<std::uint8_t, 8>{0, 0, 0x80, 0x3F, 0, 0, 0xC0, 0x7F});  // 1, NaN
+  EXPECT_FALSE(signals.Handle(frame));
+  EXPECT_EQ(signals.counters().non_finite, 1);
+  frame.SetPayload(std::array<std::uint8_t, 8>{0, 0, 0x80, 0x3F, 0, 0, 0x80, 0x3F});  // 1, 1
+  const auto sample = signals.Handle(frame);
+  ASSERT_TRUE(sample);
+  EXPECT_THAT(sample->speeds_mps, ElementsAre(1.0, 1.0));
+  EXPECT_EQ(signals.counters().non_finite, 1);
+}
+
 /// Left and right wheel in messages of their own, each with a counter.
 constexpr const char* kTwoMessagesDbc =
     "BO_ 1 L: 3 X\n SG_ SPEED : 0|16@1- (0.01,0) [0|0] \"m/s\" X\n"
