@@ -32,6 +32,10 @@ constexpr double kLeastSystematicChange = 0.03;
 /// A keyframe that leaves takes this part of what is known of the systematic errors with it: a
 /// camera that was knocked is seen within some thousand keyframes.
 constexpr double kForgotten = 5e-4;
+/// And this part, where an error is larger than so many sigmas of its prior: it is hardly one that
+/// stays. Wheels that spin for long are not of another size.
+constexpr double kForgottenOfImplausible = 0.05;
+constexpr double kImplausible = 4.0;
 /// Information with which a damped step holds the estimates, of 1 m and 0.1 rad.
 const Eigen::Vector3d kDampingInformation(1.0, 1.0, 100.0);
 
@@ -77,13 +81,16 @@ SystematicMatrix SystematicCovariance(const SystematicMatrix& posterior,
 
 /// Leaves what is known of the systematic errors to the window's next keyframe, but for a little.
 void ChainSolver::ForgetSystematic(const SystematicState& next, KeyframeWindow& window) {
-  constexpr double kKept = 1.0 - kForgotten;
+  const SystematicErrors& errors = window.systematic;
+  const bool is_plausible =
+      (errors.estimate.array().abs() <= kImplausible * errors.prior_sigmas.array()).all();
+  const double kept = 1.0 - (is_plausible ? kForgotten : kForgottenOfImplausible);
   window.prior->systematic = {.by_errors = next.effect.by_errors,
-                              .bias_cross = kKept * next.effect.bias_cross};
-  window.systematic.before_window = {.information = kKept * next.known.information,
-                                     .rhs = kKept * next.known.rhs,
-                                     .bias_covariance = kKept * kKept * next.known.bias_covariance,
-                                     .bias_cross = kKept * next.known.bias_cross};
+                              .bias_cross = kept * next.effect.bias_cross};
+  window.systematic.before_window = {.information = kept * next.known.information,
+                                     .rhs = kept * next.known.rhs,
+                                     .bias_covariance = kept * kept * next.known.bias_covariance,
+                                     .bias_cross = kept * next.known.bias_cross};
 }
 
 ChainSolver::ChainSolver(std::size_t capacity) : nodes_(capacity), systematic_(capacity) {}

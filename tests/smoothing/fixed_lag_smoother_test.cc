@@ -809,6 +809,25 @@ TEST(FixedLagSmootherTest, LearnsTheOdometrysErrorsQuicklyAfterAReset) {
   EXPECT_GT(changes, 15);
 }
 
+/// Which it takes for wheels of another size, until they no longer spin.
+TEST(FixedLagSmootherTest, ForgetsWheelsThatSpunForLong) {
+  SmootherConfig config;
+  config.window_keyframes = 10;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    auto drive = DriveSimulator({.duration_s = 120.0, .fix_rate_hz = 5.0}, seed).Run();
+    const MonotonicTime begin = drive.log.odometry.front().time;
+    for (OdometryStep& step : drive.log.odometry) {
+      const Pose2& motion = step.X_BprevB;
+      if (step.time - begin > seconds(60)) continue;
+      step.X_BprevB = Pose2(1.5 * motion.x(), 1.5 * motion.y(), motion.yaw());
+    }
+    FixedLagSmoother smoother(config);
+    const SmootherEstimate estimate = Drive(drive, smoother);
+    EXPECT_LT(std::abs(smoother.systematic_errors().odometry_scale()), 0.05) << seed;
+    EXPECT_LT(PositionError(estimate.X_WB, drive.X_WB_end), 0.6) << seed;
+  }
+}
+
 TEST(SmoothAllTest, FindsTheCamerasOffset) {
   const auto drive = DriveSimulator(DriveWithOffsetCamera(0.15), 2).Run();
   SystematicErrors causal;
