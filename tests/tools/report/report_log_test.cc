@@ -103,7 +103,7 @@ TEST(ReportLogTest, AFileThatIsNoLogIsRefused) {
   const auto facts = ReadLogFacts(folder.Write("notes.txt", "hello"), 0);
   ASSERT_FALSE(facts);
   EXPECT_EQ(facts.error().kind, ErrorKind::kInvalidInput);
-  EXPECT_THAT(facts.error().message, HasSubstr("notes.txt: has no message, must be a log"));
+  EXPECT_THAT(facts.error().message, HasSubstr("notes.txt: has no message in 5 bytes, must be of"));
 }
 
 }  // namespace
